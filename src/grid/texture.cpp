@@ -232,6 +232,20 @@ TextureFrame texture_frame(const VoxelFace& face, Direction direction) {
   return frame;
 }
 
+VoxelFace turned_face(const VoxelFaces& faces, Direction direction, const AxisOrientation& orientation) {
+  const Direction unturned = orientation.inverse().apply(direction);
+  VoxelFace face = faces[unturned];
+  const TextureFrame frame = texture_frame(face, unturned);
+  const TextureFrame wanted{orientation.apply(frame.right), orientation.apply(frame.down)};
+  // The eight turns and mirrors have all pairs of axes along the face.
+  for (int i = 0; i < 8; ++i) {
+    face.turn = static_cast<std::uint8_t>(i % 4);
+    face.mirrored = i >= 4;
+    if (texture_frame(face, direction) == wanted) break;
+  }
+  return face;
+}
+
 std::array<float, 4> texel_at(const VoxelFace& face, Direction direction, const DVec3& inside, int level) {
   const TextureFrame frame = texture_frame(face, direction);
   const int number = std::clamp(level, 0, face.texture.level_count() - 1);

@@ -200,6 +200,9 @@ struct ShapeSurroundings {
 /// along the side (for +X and -X: y and z), so that opposite sides agree. Four words of four rows each.
 using SideMask = std::array<std::uint64_t, 4>;
 
+/// ModelFace::occluders of faces that no voxel darkens.
+inline constexpr std::uint8_t kNoOccluder = 255;
+
 /// A side of a box of a model, or a free surface: flat and convex. A triangle repeats its last corner.
 struct ModelFace {
   /// In voxels; the voxel spans 0 to 1. Counter-clockwise seen from outside.
@@ -214,6 +217,10 @@ struct ModelFace {
   /// True if the face lies in the voxel's side `direction`, so that a neighbour can cover it (`mask`).
   bool on_side = false;
   SideMask mask{};  ///< for faces on a side: the squares that it touches
+  /// The eighths of voxels that darken each corner, in the order of `vertex_occlusion`: side, side, diagonal. They touch
+  /// the corner, moved to the nearest half of a voxel, in front of the face. A number is 8 (x + 3 y + 9 z) + the bit of
+  /// ShapeModel::filled_octants, for the voxel at (x, y, z) - 1 from the own one. kNoOccluder: of inclined faces.
+  std::array<std::array<std::uint8_t, 3>, 4> occluders{};
 };
 
 /// A box of a model.

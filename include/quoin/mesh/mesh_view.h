@@ -17,8 +17,8 @@ namespace [[gnu::visibility("default")]] quoin {
 /// A non-owning view of one triangle surface, from any mesher. Vertex arrays have one entry per vertex. There are two
 /// kinds of view:
 ///
-/// Blocks: `directions` and `types` are set; the types' properties define the appearance. `block_occlusion`, `atlas` or
-///         neither.
+/// Blocks: `directions` and `types` are set; the types' properties define the appearance, except of vertices with
+///         `looks`. `block_occlusion`, `atlas` or neither.
 /// Smooth: `normals` and `albedo` are set. `occlusion` is optional. `types` is optional and defines the appearance
 ///         except the colour.
 ///
@@ -36,6 +36,10 @@ struct MeshView {
   /// Texture coordinates from the upper left corner, for opaque blocks whose colours and occlusion are in a texture
   /// (SceneMeshes::atlas).
   std::span<const std::array<float, 2>> atlas;
+
+  /// Looks of shapes and turned cubes, empty if there are none, and the faces that they name: BlockyTriangles.
+  std::span<const VertexLook> looks;
+  std::span<const VoxelFace> faces;
 
   /// Linear light that arrives at each vertex, for either kind. Multiply the vertex colour by it and show the product
   /// without further shading.
@@ -58,7 +62,24 @@ struct MeshView {
   view.directions = mesh.directions;
   view.types = mesh.types;
   view.block_occlusion = mesh.occlusion;
+  view.looks = mesh.looks;
+  view.faces = mesh.faces;
   return view;
+}
+
+/// Returns the face that a block's vertex shows, or null if it has its type's colour. Requires: the view is of blocks
+/// of `types`.
+[[nodiscard]] inline const VoxelFace* face_at(const MeshView& view, std::size_t vertex, const VoxelRegistry& types) {
+  QUOIN_ASSERT(vertex < view.types.size() && view.types[vertex] < types.size(), "a vertex of a registered type");
+  if (!view.looks.empty() && view.looks[vertex].face != 0) return &view.faces[view.looks[vertex].face - 1];
+  const VoxelFaces& faces = types[view.types[vertex]].faces;
+  return faces.empty() ? nullptr : &faces[view.directions[vertex]];
+}
+
+/// Returns the normal of a block's vertex. Requires: the view is of blocks.
+[[nodiscard]] inline Vec3 normal_at(const MeshView& view, std::size_t vertex) {
+  const bool is_inclined = !view.looks.empty() && view.looks[vertex].normal != Vec3(0.0F);
+  return is_inclined ? view.looks[vertex].normal : Vec3(normal_of(view.directions[vertex]));
 }
 
 /// Returns a view of a smooth mesh. Lifetime: the mesh must outlive the view, unchanged.

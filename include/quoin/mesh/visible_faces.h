@@ -13,7 +13,8 @@
 namespace [[gnu::visibility("default")]] quoin {
 
 // The face of a voxel of type `a` towards a voxel of type `b` is visible if `a` is not air, and `b` is air or a
-// transparent type other than `a`.
+// transparent type other than `a`. Voxels with shapes (VoxelProperties::shapes) have none of these faces; an opaque one
+// hides a face if it covers the whole side.
 
 /// Visible faces of a chunk as bit masks, filled by BlockyMesher::find_faces.
 struct FaceRows {

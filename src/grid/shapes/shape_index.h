@@ -84,10 +84,4 @@ class ShapeIndex {
   std::unordered_map<IVec3, std::shared_ptr<const ChunkShapes>, CoordinateHash> chunks_;
 };
 
-// Returns true if the neighbour of a voxel in a direction covers a face (ModelFace::mask) on the voxel's side there.
-// `neighbour_model`: null for a cube. `type`: of the voxel with the face: voxels of one transparent type hide
-// each other's common faces.
-[[nodiscard]] bool covers(const VoxelRegistry& types, VoxelType neighbour, const ShapeModel* neighbour_model,
-                          VoxelType type, Direction direction, const SideMask& mask);
-
 }  // namespace quoin

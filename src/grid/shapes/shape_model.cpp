@@ -129,6 +129,36 @@ SideMask squares_of(const std::array<Vec3, 4>& corners, int axis) {
   return mask;
 }
 
+// Returns the number of an eighth of a voxel by its position in halves of voxels (ModelFace::occluders).
+std::uint8_t octant_number(const IVec3& half) {
+  const IVec3 voxel = (half + 2) / 2;  // the own voxel: (1, 1, 1)
+  return static_cast<std::uint8_t>(8 * (voxel.x + 3 * voxel.y + 9 * voxel.z) + (half.x & 1) + 2 * (half.y & 1) +
+                                   4 * (half.z & 1));
+}
+
+// Fills ModelFace::occluders of a face along the axes.
+void find_occluders(ModelFace& face) {
+  const FaceFrame& frame = frame_of(face.direction);
+  const Vec3 middle = (face.corners[0] + face.corners[2]) * 0.5F;
+  for (std::size_t i = 0; i < 4; ++i) {
+    IVec3 corner;
+    for (int axis = 0; axis < 3; ++axis) {
+      corner[axis] = std::clamp(static_cast<int>(std::lround(2.0F * face.corners[i][axis])), -1, 3);
+    }
+    const auto octant = [&](bool is_beyond_u, bool is_beyond_v) {
+      const auto lies_before = [&](int axis, bool is_beyond) {
+        return (face.corners[i][axis] > middle[axis]) != is_beyond ? 1 : 0;
+      };
+      IVec3 half = corner;
+      if (frame.sign < 0) --half[frame.axis];
+      half[frame.u] -= lies_before(frame.u, is_beyond_u);
+      half[frame.v] -= lies_before(frame.v, is_beyond_v);
+      return octant_number(half);
+    };
+    face.occluders[i] = {octant(true, false), octant(false, true), octant(true, true)};
+  }
+}
+
 class ModelBuilder {
  public:
   void add(const ShapeElement& element, const AxisOrientation& orientation) {
@@ -284,6 +314,7 @@ class ModelBuilder {
     const float length = glm::length(normal);
     if (length > 0.0F) face.normal = normal / length;
     face.direction = nearest_direction(DVec3(face.normal));
+    for (auto& corner : face.occluders) corner.fill(kNoOccluder);
     if (is_tilted) return;
     const FaceFrame& frame = frame_of(face.direction);
     face.normal = Vec3(normal_of(face.direction));
@@ -292,6 +323,7 @@ class ModelBuilder {
       for (int axis = 0; axis < 3; ++axis) face.on_side = face.on_side && corner[axis] >= 0.0F && corner[axis] <= 1.0F;
     }
     if (face.on_side) face.mask = squares_of(face.corners, frame.axis);
+    find_occluders(face);
   }
 
   void add_free(const std::array<Vec3, 4>& corners, Direction direction) {

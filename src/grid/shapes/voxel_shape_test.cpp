@@ -14,41 +14,17 @@
 #include <quoin/grid/voxel_shape.h>
 
 #include "grid/shapes/shape_index.h"
+#include "grid/shapes/shapes_for_tests.h"
 
 namespace quoin {
 namespace {
 
-VoxelShape slab() {
-  return VoxelShape::box({0, 0, 0}, {16, 8, 16});
-}
+using shapes_for_tests::fence;
+using shapes_for_tests::slab;
+using shapes_for_tests::stairs;
 
 const ShapeModel& model_of(const VoxelShapes& shapes, const AxisOrientation& orientation = {}) {
   return shapes.model(0, orientation, {});
-}
-
-// Stairs of one box below and quarters above it, as ShapeNeighbours::Stairs describes.
-VoxelShapes stairs() {
-  const auto quarter = [](int x, int z) { return VoxelShape::box({x, 8, z}, {x + 8, 16, z + 8}); };
-  const auto at = [](StairCorner corner) { return ShapeCondition{.corner = corner}; };
-  using enum StairCorner;
-  return *VoxelShapes::from_rules(
-      {.parts = {{.shape = slab()},
-                 {.shape = quarter(8, 0), .when = {at(Straight), at(OuterLeft), at(InnerLeft), at(InnerRight)}},
-                 {.shape = quarter(8, 8), .when = {at(Straight), at(OuterRight), at(InnerLeft), at(InnerRight)}},
-                 {.shape = quarter(0, 0), .when = {at(InnerLeft)}},
-                 {.shape = quarter(0, 8), .when = {at(InnerRight)}}},
-       .neighbours = ShapeNeighbours::Stairs});
-}
-
-VoxelShapes fence() {
-  std::vector<ShapePart> parts = {{.shape = VoxelShape::box({6, 0, 6}, {10, 16, 10})}};
-  for (int turns = 0; turns < 4; ++turns) {
-    const AxisOrientation turn = AxisOrientation::quarter_turns(1, turns);
-    parts.push_back({.shape = VoxelShape::box({10, 6, 7}, {16, 9, 9}),
-                     .orientation = turn,
-                     .when = {{.connected = {turn.apply(Direction::PosX)}}}});
-  }
-  return *VoxelShapes::from_rules({.parts = std::move(parts), .neighbours = ShapeNeighbours::Connected});
 }
 
 int filled(const ShapeModel& model) {

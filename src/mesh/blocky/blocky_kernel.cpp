@@ -171,11 +171,45 @@ void end_at_border(const SlabRange& range, Scratch& s) {
   }
 }
 
+// Finds the shaped voxels of the region and around it, by the layers of opaque voxels.
+void find_shapes(const Job& whole, Scratch& s) {
+  Job job = whole;
+  job.by = LayerClass::Shape;
+  const SlabRange range = slabs_around(job.region);
+  ShapedVoxels& shapes = *job.shapes;
+  if (shapes.is_in_centre) {
+    fill_layers(job, range, s);
+  } else {
+    for (int z = range.z.begin; z < range.z.end; ++z) {
+      for (int y = range.y.begin; y < range.y.end; y += kLanes) store(s.z.opaque.words + word_index(z, y), Words{});
+    }
+  }
+  const bool has_ends = gather_border(job, s);
+  shapes.cells = s.z.opaque;
+  if (has_ends) shapes.ends = s.z.ends;
+  list_shapes(job, has_ends);
+}
+
+// Finds the visible faces of cubes: shaped voxels have none in these layers, and hide those that they cover.
+void find_faces_of_cubes(const Job& job, bool row_ends, Scratch& s) {
+  for (int z = job.region.min.z; z < job.region.max.z; ++z) {
+    for (int y = rounded_down(job.region.min.y); y < job.region.max.y; y += kLanes) {
+      const int at = word_index(z, y);
+      store(s.solid.words + at, load(s.solid.words + at) & ~load(job.shapes->cells.words + at));
+    }
+  }
+  find_faces_of_all_types(job, row_ends, s);
+  hide_faces_behind_shapes(job, s);
+}
+
 void find_all_faces(const Job& job, Scratch& s) {
+  if (job.shapes != nullptr) find_shapes(job, s);
   const SlabRange range = slabs_around(job.region);
   fill_layers(job, range, s);
   end_at_border(range, s);
-  find_faces_of_all_types(job, gather_border(job, s), s);
+  const bool row_ends = gather_border(job, s);
+  if (job.shapes != nullptr) return find_faces_of_cubes(job, row_ends, s);
+  find_faces_of_all_types(job, row_ends, s);
 }
 
 std::int64_t count_all_faces(const Job& job, Scratch& s) {
@@ -209,32 +243,42 @@ void turn_views(const Job& job, bool row_ends, Scratch& s) {
     turn_bits(s.z.same_row, s.x.same_row, range.y);
   }
   if (!job.has_transparent) return;
-  if (!job.by_occlusion) find_faces_of_all_types(job, row_ends, s);
+  if (!job.has_faces) find_faces_of_all_types(job, row_ends, s);
   turn_faces(range, s);
 }
 
 // Finds the faces, then fills the layers of opaque voxels again with only those that occlude: the passes over
 // directions use them only for occlusion if the faces are given. Returns the job with these layers, and `row_ends`.
 std::pair<Job, bool> find_faces_first(Job job, bool row_ends, Scratch& s) {
-  find_faces_of_all_types(job, row_ends, s);
-  job.by_occlusion = true;
-  const SlabRange range = slabs_around(job.region);
-  fill_layers(job, range, s);
-  end_at_border(range, s);
-  return {job, gather_border(job, s)};
+  if (job.shapes != nullptr) {
+    find_faces_of_cubes(job, row_ends, s);
+  } else {
+    find_faces_of_all_types(job, row_ends, s);
+  }
+  job.has_faces = true;
+  if (job.has_unoccluding) {
+    job.by = LayerClass::Occlusion;
+    const SlabRange range = slabs_around(job.region);
+    fill_layers(job, range, s);
+    end_at_border(range, s);
+    row_ends = gather_border(job, s);
+  }
+  if (job.shapes != nullptr) take_faces_next_to_shapes(job, row_ends, s);
+  return {job, row_ends};
 }
 
 void mesh_chunk(const Job& whole, Scratch& s, QuadBuffer& out) {
   Job job = whole;
   const TypeSource types = find_types(*job.chunks->centre(), s);
   job.one_type = types.log_bits == kOneType && !job.has_transparent;
+  if (job.shapes != nullptr) find_shapes(job, s);
   const SlabRange range = slabs_around(job.region);
   fill_layers(job, range, s);
   if (!job.one_type) end_at_border(range, s);
   bool row_ends = gather_border(job, s);
   job.region = above_solid_floor(job, row_ends, s);
   if (job.region.empty()) return;
-  if (job.has_unoccluding) std::tie(job, row_ends) = find_faces_first(job, row_ends, s);
+  if (job.has_unoccluding || job.shapes != nullptr) std::tie(job, row_ends) = find_faces_first(job, row_ends, s);
   fill_row_masks(job.region, s);
   turn_views(job, row_ends, s);
   run_directions(job, row_ends, types, s, out);

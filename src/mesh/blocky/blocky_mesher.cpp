@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cstring>
+#include <map>
+#include <memory>
+#include <utility>
 
 #include <quoin/core/assert.h>
 #include <quoin/core/memory.h>
@@ -161,6 +165,409 @@ void hide_faces_at_border(const Job& job, Scratch& s) {
   }
 }
 
+namespace {
+
+Direction opposite(Direction direction) {
+  return static_cast<Direction>(static_cast<std::size_t>(direction) ^ 1U);
+}
+
+// Returns true if a chunk has voxels with shapes. 16 bits per voxel: it may have some.
+bool holds_shapes(const Chunk* chunk, const VoxelRegistry& types) {
+  if (chunk == nullptr) return false;
+  const ChunkStorage* voxels = ChunkStorage::of(*chunk);
+  if (voxels == nullptr) return types.is_shaped(*chunk->uniform());
+  if (voxels->direct()) return true;
+  for (std::size_t i = 0; i < voxels->palette.size(); ++i) {
+    if (voxels->counts[i] != 0 && types.is_shaped(voxels->palette[i])) return true;
+  }
+  return false;
+}
+
+// Distances from a voxel to its 26 neighbours and itself in ShapedVoxels::octants, by Neighbourhood::index.
+constexpr std::array<int, 32> kOctantOffsets = [] {
+  std::array<int, 32> offsets{};
+  for (int i = 0; i < 27; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    offsets[at] = ((i / 9 - 1) * ShapedVoxels::kEdge + i / 3 % 3 - 1) * ShapedVoxels::kOctantStride + i % 3 - 1;
+  }
+  return offsets;
+}();
+
+using CornerOccluders = std::array<std::array<std::uint8_t, 3>, 4>;  // ModelFace::occluders
+
+// Returns the occluders of a cube's faces, by direction.
+const std::array<CornerOccluders, 6>& cube_occluders() {
+  static const std::array<CornerOccluders, 6> all = [] {
+    const VoxelShapes cube(VoxelShape::box(IVec3(0), IVec3(kShapeUnits)));
+    std::array<CornerOccluders, 6> made{};
+    for (const ModelFace& face : cube.model(0, {}, {}).faces) {
+      made[static_cast<std::size_t>(face.direction)] = face.occluders;
+    }
+    return made;
+  }();
+  return all;
+}
+
+// Returns the occlusion of a face of a voxel, two bits per corner. `octants`: of the voxel.
+unsigned occlusion_of(const CornerOccluders& occluders, const std::uint8_t* octants) {
+  const auto is_filled = [&](std::uint8_t number) {
+    return (octants[kOctantOffsets[number >> 3U]] >> (number & 7U) & 1U) != 0;
+  };
+  unsigned bits = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto& [side1, side2, diagonal] = occluders[i];
+    bits |= unsigned{vertex_occlusion(is_filled(side1), is_filled(side2), is_filled(diagonal))} << 2 * i;
+  }
+  return bits;
+}
+
+FaceOcclusion unpacked_occlusion(unsigned bits) {
+  FaceOcclusion corners{};
+  for (std::size_t i = 0; i < 4; ++i) corners[i] = static_cast<std::uint8_t>(bits >> 2 * i & 3U);
+  return corners;
+}
+
+void fill_octants_of_row(std::uint64_t row, std::uint64_t ends, std::uint8_t* out) {
+  static const std::array<std::uint64_t, 256> spread = [] {
+    std::array<std::uint64_t, 256> made{};
+    for (std::uint64_t bits = 0; bits < 256; ++bits) {
+      for (unsigned i = 0; i < 8; ++i) made[bits] |= (bits >> i & 1U) * (std::uint64_t{0xFF} << 8 * i);
+    }
+    return made;
+  }();
+  for (std::size_t i = 0; i < 8; ++i) std::memcpy(out + 8 * i, &spread[row >> 8 * i & 0xFF], 8);
+  out[-1] = static_cast<std::uint8_t>(0 - (ends >> 63));
+  out[kChunkEdge] = static_cast<std::uint8_t>(0 - (ends & 1));
+}
+
+// Fills the octants of all voxels within two of shaped ones.
+void fill_octants(const Job& job, bool row_ends, const Scratch& s) {
+  ShapedVoxels& shapes = *job.shapes;
+  shapes.octants.resize(ShapedVoxels::kRows * ShapedVoxels::kOctantStride);
+  std::array<bool, ShapedVoxels::kRows> is_filled{};
+  const auto fill_around = [&](int y0, int z0) {
+    for (int z = std::max(z0 - 2, -1); z <= std::min(z0 + 2, kChunkEdge); ++z) {
+      for (int y = std::max(y0 - 2, -1); y <= std::min(y0 + 2, kChunkEdge); ++y) {
+        if (std::exchange(is_filled[ShapedVoxels::row_of(y, z)], true)) continue;
+        const auto at = static_cast<std::size_t>(word_index(z, y));
+        fill_octants_of_row(s.z.opaque.words[at], row_ends ? s.z.ends.words[at] : 0,
+                            &shapes.octants[ShapedVoxels::octants_at({0, y, z})]);
+      }
+    }
+  };
+  const ShapedVoxel* last = nullptr;
+  for (const ShapedVoxel& voxel : shapes.voxels) {
+    if (last == nullptr || last->local.y != voxel.local.y || last->local.z != voxel.local.z) {
+      fill_around(voxel.local.y, voxel.local.z);
+    }
+    last = &voxel;
+  }
+  for (const ShapedVoxel& voxel : shapes.voxels) {
+    if (voxel.darkens) shapes.octants[ShapedVoxels::octants_at(voxel.local)] = voxel.model->filled_octants;
+  }
+  shapes.has_octants = true;
+}
+
+// The faces around a voxel whose corners it may darken.
+struct DarkenedFaces {
+  // Of the eight faces of a direction around the voxel, those that touch one of some octants, as bits by [octants].
+  std::array<std::uint8_t, 256> by_octants{};
+  std::array<IVec3, 8> offsets{};  // of the faces' voxels
+};
+
+const std::array<DarkenedFaces, 6>& darkened_faces() {
+  static const std::array<DarkenedFaces, 6> all = [] {
+    std::array<DarkenedFaces, 6> made{};
+    for (const Direction direction : kDirections) {
+      DarkenedFaces& faces = made[static_cast<std::size_t>(direction)];
+      const FaceFrame& frame = frame_of(direction);
+      std::size_t number = 0;
+      for (int i = 0; i < 9; ++i) {
+        if (i == 4) continue;  // the voxel in front of a face does not darken it
+        IVec3& offset = faces.offsets[number];
+        offset = -normal_of(direction);
+        offset[frame.u] += i % 3 - 1;
+        offset[frame.v] += i / 3 - 1;
+        for (unsigned octants = 0; octants < 256; ++octants) {
+          for (unsigned octant = 0; octant < 8; ++octant) {
+            if ((octants >> octant & 1U) == 0) continue;
+            bool touches = true;
+            for (unsigned axis = 0; axis < 3; ++axis) {
+              const int side = (octant >> axis & 1U) != 0 ? 1 : -1;
+              touches &= offset[static_cast<int>(axis)] == 0 || offset[static_cast<int>(axis)] == side;
+            }
+            if (touches) faces.by_octants[octants] |= static_cast<std::uint8_t>(1U << number);
+          }
+        }
+        ++number;
+      }
+    }
+    return made;
+  }();
+  return all;
+}
+
+// The place of a face in the mesher's order: direction, plane, row, column.
+struct FaceOrder {
+  static constexpr std::array<int, 3> kRowAxis = {1, 2, 1};
+  static constexpr std::array<int, 3> kBitAxis = {2, 0, 0};
+
+  static std::uint64_t key(Direction direction, const IVec3& voxel) {
+    const std::size_t axis = frame_of(direction).axis;
+    const auto part = [&](int of) { return static_cast<std::uint64_t>(voxel[of]); };
+    return static_cast<std::uint64_t>(direction) << 18 | part(static_cast<int>(axis)) << 12 |
+           part(kRowAxis[axis]) << 6 | part(kBitAxis[axis]);
+  }
+  static std::pair<Direction, IVec3> face(std::uint64_t key) {
+    const auto direction = static_cast<Direction>(key >> 18);
+    const std::size_t axis = frame_of(direction).axis;
+    IVec3 voxel;
+    voxel[static_cast<int>(axis)] = static_cast<int>(key >> 12 & 63);
+    voxel[kRowAxis[axis]] = static_cast<int>(key >> 6 & 63);
+    voxel[kBitAxis[axis]] = static_cast<int>(key & 63);
+    return {direction, voxel};
+  }
+};
+
+// Removes a face from the layers of faces. Returns false if it is not there. Requires: a voxel of the chunk.
+bool take_face(Direction direction, const IVec3& voxel, Scratch& s) {
+  std::uint64_t& row = faces_towards(direction, s).words[word_index(voxel.z, voxel.y)];
+  const std::uint64_t bit = std::uint64_t{1} << voxel.x;
+  return (std::exchange(row, row & ~bit) & bit) != 0;
+}
+
+// Replaces the keys of single faces, sorted, by their quads.
+void make_quads(const Job& job, QuadBuffer& faces) {
+  const ShapedVoxels& shapes = *job.shapes;
+  std::size_t count = 0;
+  std::uint64_t last_key = 0;
+  for (const Quad face : faces) {  // read before it is overwritten: there are no more quads than faces
+    const auto [direction, voxel] = FaceOrder::face(face.bits);
+    const FaceFrame& frame = frame_of(direction);
+    const unsigned packed = occlusion_of(cube_occluders()[static_cast<std::size_t>(direction)],
+                                         &shapes.octants[ShapedVoxels::octants_at(voxel)]);
+    const FaceOcclusion corners = unpacked_occlusion(packed);
+    Quad quad;
+    quad.bits = static_cast<std::uint64_t>(voxel.x) | static_cast<std::uint64_t>(voxel.y) << 6 |
+                static_cast<std::uint64_t>(voxel.z) << 12 | std::uint64_t{packed} << Quad::kOcclusionShift |
+                std::uint64_t{flips_diagonal(corners)} << Quad::kFlipShift |
+                static_cast<std::uint64_t>(direction) << Quad::kDirectionShift |
+                std::uint64_t{job.chunks->get(voxel)} << Quad::kTypeShift;
+    const bool is_u = FaceOrder::kBitAxis[frame.axis] == frame.u;  // columns are along u
+    const bool is_constant = is_u ? corners[0] == corners[1] && corners[3] == corners[2]
+                                  : corners[0] == corners[3] && corners[1] == corners[2];
+    const int shift = is_u ? Quad::kSizeUShift : Quad::kSizeVShift;
+    constexpr std::uint64_t kLook = ~((std::uint64_t{1} << Quad::kOcclusionShift) - 1);
+    const bool continues = count > 0 && face.bits == last_key + 1 && (face.bits & 63) != 0;
+    last_key = face.bits;
+    if (job.merge && continues && is_constant && (faces[count - 1].bits & kLook) == (quad.bits & kLook)) {
+      faces[count - 1].bits += std::uint64_t{1} << shift;
+    } else {
+      faces[count++] = quad;
+    }
+  }
+  faces.resize(count);
+}
+
+}  // namespace
+
+const ShapedVoxel* ShapedVoxels::at(const IVec3& local) const {
+  const auto word = static_cast<std::size_t>(word_index(local.z, local.y));
+  const std::uint64_t row = cells.words[word];
+  const std::uint64_t before = ends.words[word] >> 63;
+  std::size_t number = first[row_of(local.y, local.z)];
+  if (local.x < 0) return before != 0 ? &voxels[number] : nullptr;
+  number += before;
+  if (local.x == kChunkEdge) {
+    number += static_cast<std::size_t>(std::popcount(row));
+    return (ends.words[word] & 1U) != 0 ? &voxels[number] : nullptr;
+  }
+  if ((row >> local.x & 1U) == 0) return nullptr;
+  number += static_cast<std::size_t>(std::popcount(row & ((std::uint64_t{1} << local.x) - 1)));
+  return &voxels[number];
+}
+
+void list_shapes(const Job& job, bool has_ends) {
+  ShapedVoxels& shapes = *job.shapes;
+  shapes.voxels.clear();
+  shapes.quads.clear();
+  shapes.has_octants = false;
+  const IBox around{job.region.min - 1, job.region.max + 1};
+  const int first = std::max(around.min.x, 0);
+  const int last = std::min(around.max.x, kChunkEdge) - 1;
+  const std::uint64_t cells = (~std::uint64_t{0} << first) & (~std::uint64_t{0} >> (kChunkEdge - 1 - last));
+  const std::uint64_t ends =
+      has_ends ? std::uint64_t{around.min.x < 0} << 63 | std::uint64_t{around.max.x > kChunkEdge} : 0;
+  const auto add = [&](const IVec3& local) {
+    const VoxelType type = job.chunks->get(local);
+    const bool darkens = (*job.types)[type].visibility == Visibility::Opaque;
+    shapes.voxels.push_back({local, type, darkens, shape_at(*job.chunks, *job.types, local)});
+  };
+  for (int z = around.min.z; z < around.max.z; ++z) {
+    for (int y = around.min.y; y < around.max.y; ++y) {
+      const auto at = static_cast<std::size_t>(word_index(z, y));
+      const std::uint64_t row = shapes.cells.words[at] &= cells;
+      const std::uint64_t beyond = shapes.ends.words[at] &= ends;
+      shapes.first[ShapedVoxels::row_of(y, z)] = static_cast<std::uint32_t>(shapes.voxels.size());
+      if ((beyond >> 63) != 0) add({-1, y, z});
+      for (std::uint64_t left = row; left != 0; left &= left - 1) add({std::countr_zero(left), y, z});
+      if ((beyond & 1U) != 0) add({kChunkEdge, y, z});
+    }
+  }
+}
+
+namespace {
+
+// Returns true if the neighbour of a shaped voxel covers a face on its side.
+bool is_covered(const Job& job, const ShapedVoxel& voxel, const ModelFace& face) {
+  const IVec3 at = voxel.local + normal_of(face.direction);
+  const ShapedVoxels& shapes = *job.shapes;
+  if (const ShapedVoxel* other = shapes.at(at)) {
+    return covers(*job.types, other->type, other->model, voxel.type, face.direction, face.mask);
+  }
+  // All opaque cubes fill their octants, if all of them occlude.
+  if (shapes.has_octants && !job.has_unoccluding) return shapes.octants[ShapedVoxels::octants_at(at)] != 0;
+  return covers(*job.types, job.chunks->get(at), nullptr, voxel.type, face.direction, face.mask);
+}
+
+}  // namespace
+
+void append_shape_faces(const Job& job, ShapeFaceBuffer& out) {
+  const ShapedVoxels& shapes = *job.shapes;
+  for (const ShapedVoxel& voxel : shapes.voxels) {
+    if (!job.region.contains(voxel.local)) continue;
+    const std::uint8_t* const octants =
+        shapes.has_octants ? &shapes.octants[ShapedVoxels::octants_at(voxel.local)] : nullptr;
+    const auto place = static_cast<std::uint32_t>(voxel.local.x | voxel.local.y << 6 | voxel.local.z << 12);
+    std::uint16_t number = 0;
+    for (const ModelFace& face : voxel.model->faces) {
+      const std::uint16_t own = number++;
+      if (face.on_side && is_covered(job, voxel, face)) continue;
+      ShapeFace made{voxel.model, place, own, voxel.type};
+      if (octants != nullptr && face.occluders[0][0] != kNoOccluder) {
+        made.bits |= occlusion_of(face.occluders, octants) << ShapeFace::kOcclusionShift;
+      }
+      out.push_back(made);
+    }
+  }
+}
+
+namespace {
+
+// Inserts quads, each behind those of its direction. Both buffers are sorted by direction.
+void insert_by_direction(const QuadBuffer& more, QuadBuffer& quads) {
+  std::size_t left = quads.size();
+  std::size_t more_left = more.size();
+  quads.resize(left + more_left);
+  for (std::size_t to = quads.size(); more_left > 0; --to) {
+    const bool is_before = left > 0 && quads[left - 1].direction() > more[more_left - 1].direction();
+    quads[to - 1] = is_before ? quads[--left] : more[--more_left];
+  }
+}
+
+}  // namespace
+
+const TurnedTypes::Looks& TurnedTypes::looks_of(VoxelType type, const VoxelFaces& faces) {
+  const auto [known, is_new] = looks_.try_emplace(type);
+  Looks& looks = known->second;
+  if (!is_new && looks.faces == faces) return looks;
+  looks.faces = faces;
+  for (const Direction direction : kDirections) {
+    std::array<VoxelFace, AxisOrientation::kCount> shown;
+    auto& first = looks.first[static_cast<std::size_t>(direction)];
+    for (std::size_t i = 0; i < shown.size(); ++i) {
+      if (!faces.empty()) shown[i] = turned_face(faces, direction, AxisOrientation::at(static_cast<int>(i)));
+      first[i] = static_cast<std::uint8_t>(
+          faces.empty() ? i
+                        : static_cast<std::size_t>(std::find(shown.begin(), shown.end(), shown[i]) - shown.begin()));
+    }
+  }
+  return looks;
+}
+
+void TurnedTypes::append_parts(const Quad& quad, const Chunk& chunk, const StateOrientations& orientations,
+                               const Looks& looks) {
+  const FaceFrame& frame = frame_of(quad.direction());
+  const auto& first = looks.first[static_cast<std::size_t>(quad.direction())];
+  const int width = quad.size_u();
+  const int height = quad.size_v();
+  std::array<std::uint8_t, std::size_t{kChunkEdge} * kChunkEdge> of;  // the first width * height are set
+  constexpr std::uint8_t kDone = 255;
+  const auto at = [&](int u, int v) -> std::uint8_t& { return of[static_cast<std::size_t>(u + width * v)]; };
+  for (int v = 0; v < height; ++v) {
+    for (int u = 0; u < width; ++u) {
+      IVec3 voxel = quad.voxel();
+      voxel[frame.u] += u;
+      voxel[frame.v] += v;
+      at(u, v) = first[static_cast<std::size_t>(orientations.of(chunk.data(voxel).state).index())];
+    }
+  }
+  for (int v = 0; v < height; ++v) {
+    for (int u = 0; u < width; ++u) {
+      const std::uint8_t orientation = at(u, v);
+      if (orientation == kDone) continue;
+      int size_u = 1;
+      int size_v = 1;
+      while (u + size_u < width && at(u + size_u, v) == orientation) ++size_u;
+      const auto is_equal = [&](int row) {
+        const std::uint8_t* const begin = &at(u, row);
+        return std::all_of(begin, begin + size_u, [&](std::uint8_t other) { return other == orientation; });
+      };
+      while (v + size_v < height && is_equal(v + size_v)) ++size_v;
+      for (int row = v; row < v + size_v; ++row) std::fill_n(&at(u, row), size_u, kDone);
+      Quad part = quad_part(quad, u, v, size_u, size_v);
+      part.bits |= std::uint64_t{orientation} << Quad::kOrientationShift;
+      made_.push_back(part);
+    }
+  }
+}
+
+void TurnedTypes::apply(const Chunk& chunk, const VoxelRegistry& types, QuadBuffer& quads) {
+  const auto is_turned = [&](const Quad& quad) { return types.is_turned_by_state(quad.type()); };
+  if (std::ranges::none_of(quads, is_turned)) return;
+  made_.clear();
+  for (const Quad quad : quads) {
+    if (is_turned(quad)) {
+      const VoxelProperties& type = types[quad.type()];
+      append_parts(quad, chunk, type.orientations, looks_of(quad.type(), type.faces));
+    } else {
+      made_.push_back(quad);
+    }
+  }
+  std::swap(made_, quads);
+}
+
+void hide_faces_behind_shapes(const Job& job, Scratch& s) {
+  for (const ShapedVoxel& voxel : job.shapes->voxels) {
+    if (!voxel.darkens) continue;
+    for (const Direction side : kDirections) {
+      if (!voxel.model->covers_side[static_cast<std::size_t>(side)]) continue;
+      const IVec3 behind = voxel.local + normal_of(side);
+      if (job.region.contains(behind)) take_face(opposite(side), behind, s);
+    }
+  }
+}
+
+void take_faces_next_to_shapes(const Job& job, bool row_ends, Scratch& s) {
+  ShapedVoxels& shapes = *job.shapes;
+  if (!job.occlusion || shapes.voxels.empty()) return;
+  fill_octants(job, row_ends, s);
+  for (const ShapedVoxel& voxel : shapes.voxels) {
+    if (!voxel.darkens || voxel.model->filled_octants == 0) continue;
+    for (const Direction direction : kDirections) {
+      const DarkenedFaces& faces = darkened_faces()[static_cast<std::size_t>(direction)];
+      for (unsigned left = faces.by_octants[voxel.model->filled_octants]; left != 0; left &= left - 1) {
+        const IVec3 at = voxel.local + faces.offsets[static_cast<std::size_t>(std::countr_zero(left))];
+        if (job.region.contains(at) && take_face(direction, at, s)) {
+          shapes.quads.push_back({FaceOrder::key(direction, at)});
+        }
+      }
+    }
+  }
+  std::ranges::sort(shapes.quads, {}, &Quad::bits);
+  make_quads(job, shapes.quads);
+}
+
 }  // namespace blocky
 
 namespace {
@@ -175,7 +582,7 @@ bool face_is_visible(const VoxelRegistry& types, VoxelType a, VoxelType b) {
 // Returns true for a chunk of one type that its six neighbours hide completely. No voxel is read then.
 bool is_buried(const Neighbourhood& chunks, const VoxelRegistry& types) {
   const auto type = chunks.centre()->uniform();
-  if (!type.has_value()) return false;
+  if (!type.has_value() || types.is_shaped(*type)) return false;
   return std::all_of(kDirections.begin(), kDirections.end(), [&](Direction d) {
     const IVec3 n = normal_of(d);
     const Chunk* neighbour = chunks.at(n.x, n.y, n.z);
@@ -185,21 +592,40 @@ bool is_buried(const Neighbourhood& chunks, const VoxelRegistry& types) {
   });
 }
 
-// Returns the job for the visible faces of a region.
-blocky::Job job_of_faces(const Neighbourhood& chunks, const VoxelRegistry& types, const IBox& region) {
-  return {.chunks = &chunks,
-          .types = &types,
-          .region = region,
-          .merge = false,
-          .occlusion = false,
-          .has_transparent = blocky::holds_transparent(*chunks.centre(), types),
-          .one_type = false};
-}
-
 }  // namespace
 
 struct BlockyMesher::Scratch : blocky::Scratch, LargeObject {
+  struct Shapes : blocky::ShapedVoxels, LargeObject {};
+
   const blocky::Kernel& kernel = blocky::kKernels.widest();
+  std::unique_ptr<Shapes> shapes;  // null before the first chunk with shapes
+  blocky::TurnedTypes turned;
+
+  // Returns the shapes of a chunk and its neighbours, to be listed by a kernel, or null if they have none.
+  [[nodiscard]] blocky::ShapedVoxels* shapes_of(const Neighbourhood& chunks, const VoxelRegistry& types) {
+    if (!types.has_shapes()) return nullptr;
+    const bool is_in_centre = blocky::holds_shapes(chunks.centre(), types);
+    if (!is_in_centre &&
+        std::ranges::none_of(chunks.chunks, [&](const Chunk* each) { return blocky::holds_shapes(each, types); })) {
+      return nullptr;
+    }
+    if (shapes == nullptr) shapes = std::make_unique<Shapes>();
+    shapes->is_in_centre = is_in_centre;
+    return shapes.get();
+  }
+
+  // Returns the job for the visible faces of a region.
+  [[nodiscard]] blocky::Job job_of_faces(const Neighbourhood& chunks, const VoxelRegistry& types, const IBox& region) {
+    blocky::ShapedVoxels* const shaped = shapes_of(chunks, types);
+    return {.chunks = &chunks,
+            .types = &types,
+            .region = region,
+            .merge = false,
+            .occlusion = false,
+            .has_transparent = shaped != nullptr || blocky::holds_transparent(*chunks.centre(), types),
+            .one_type = false,
+            .shapes = shaped};
+  }
 };
 
 BlockyMesher::BlockyMesher() : scratch_(new Scratch()) {
@@ -211,24 +637,43 @@ BlockyMesher::~BlockyMesher() = default;
 
 void BlockyMesher::mesh(const Neighbourhood& chunks, const VoxelRegistry& types, const QuadOptions& options,
                         QuadBuffer& out) {
-  impl_of(scratch_).quads = 0;
+  mesh(chunks, types, options, out, nullptr);
+}
+
+void BlockyMesher::mesh(const Neighbourhood& chunks, const VoxelRegistry& types, const QuadOptions& options,
+                        QuadBuffer& out, ShapeFaceBuffer& shapes) {
+  shapes.clear();
+  mesh(chunks, types, options, out, &shapes);
+}
+
+void BlockyMesher::mesh(const Neighbourhood& chunks, const VoxelRegistry& types, const QuadOptions& options,
+                        QuadBuffer& out, ShapeFaceBuffer* shape_faces) {
+  Scratch& scratch = impl_of(scratch_);
+  scratch.quads = 0;
   const Chunk* centre = chunks.centre();
+  blocky::ShapedVoxels* shapes = nullptr;
   if (centre != nullptr && !is_buried(chunks, types)) {
     const IBox region = intersect(intersect(options.region, kWholeChunk), centre->bounds());
     if (!region.empty()) {
       const bool has_unoccluding = options.bake_occlusion && blocky::hold_unoccluding(chunks, types);
-      const blocky::Job job{.chunks = &chunks,
-                            .types = &types,
-                            .region = region,
-                            .merge = options.merge,
-                            .occlusion = options.bake_occlusion,
-                            .has_transparent = has_unoccluding || blocky::holds_transparent(*centre, types),
-                            .one_type = false,
-                            .has_unoccluding = has_unoccluding};
-      impl_of(scratch_).kernel.mesh(job, impl_of(scratch_), out);
+      shapes = options.shapes == ShapeUse::Cubes ? nullptr : scratch.shapes_of(chunks, types);
+      const blocky::Job job{
+          .chunks = &chunks,
+          .types = &types,
+          .region = region,
+          .merge = options.merge,
+          .occlusion = options.bake_occlusion,
+          .has_transparent = has_unoccluding || shapes != nullptr || blocky::holds_transparent(*centre, types),
+          .one_type = false,
+          .has_unoccluding = has_unoccluding,
+          .shapes = shapes};
+      scratch.kernel.mesh(job, scratch, out);
+      if (shapes != nullptr && shape_faces != nullptr) blocky::append_shape_faces(job, *shape_faces);
     }
   }
-  out.resize(impl_of(scratch_).quads);
+  out.resize(scratch.quads);
+  if (shapes != nullptr) blocky::insert_by_direction(shapes->quads, out);
+  if (types.has_turned_by_state() && !out.empty()) scratch.turned.apply(*centre, types, out);
 }
 
 Quad quad_part(Quad quad, int u, int v, int size_u, int size_v) {
@@ -260,8 +705,8 @@ void BlockyMesher::find_faces(const Neighbourhood& chunks, const VoxelRegistry& 
   if (centre == nullptr || is_buried(chunks, types)) return;
   const IBox region = intersect(intersect(wanted, kWholeChunk), centre->bounds());
   if (region.empty()) return;
-  blocky::Scratch& s = impl_of(scratch_);
-  impl_of(scratch_).kernel.find_faces(job_of_faces(chunks, types, region), s);
+  Scratch& s = impl_of(scratch_);
+  s.kernel.find_faces(s.job_of_faces(chunks, types, region), s);
   const std::array<const blocky::Layer*, 6> layers = {&s.sides[0], &s.sides[1],   &s.sides[2],
                                                       &s.sides[3], &s.z.faces[0], &s.z.faces[1]};
   const int width = region.max.x - region.min.x;
@@ -280,7 +725,8 @@ std::int64_t BlockyMesher::count_faces(const Neighbourhood& chunks, const VoxelR
   if (centre == nullptr || is_buried(chunks, types)) return 0;
   const IBox region = centre->bounds();
   if (region.empty()) return 0;
-  return impl_of(scratch_).kernel.count_faces(job_of_faces(chunks, types, region), impl_of(scratch_));
+  Scratch& scratch = impl_of(scratch_);
+  return scratch.kernel.count_faces(scratch.job_of_faces(chunks, types, region), scratch);
 }
 
 std::string to_string(const FaceCounts& faces) {
@@ -298,9 +744,15 @@ std::int64_t FaceRows::count() const {
 DirectionSet visible_faces(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 voxel) {
   DirectionSet faces;
   const VoxelType type = chunks.get(voxel);
-  if (type == kAir) return faces;
+  if (type == kAir || types.is_shaped(type)) return faces;
+  SideMask whole;
+  whole.fill(~std::uint64_t{0});
   for (const Direction direction : kDirections) {
-    if (face_is_visible(types, type, chunks.get(voxel + normal_of(direction)))) faces.insert(direction);
+    const IVec3 at = voxel + normal_of(direction);
+    const VoxelType other = chunks.get(at);
+    const bool is_hidden =
+        types.is_shaped(other) && covers(types, other, shape_at(chunks, types, at), type, direction, whole);
+    if (!is_hidden && face_is_visible(types, type, other)) faces.insert(direction);
   }
   return faces;
 }
@@ -329,11 +781,17 @@ void visible_faces(const Neighbourhood& chunks, const VoxelRegistry& types, cons
 FaceOcclusion face_occlusion(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 voxel,
                              Direction direction) {
   QUOIN_ASSERT(static_cast<std::size_t>(direction) < kCornerNeighbours.size(), "one of the six directions");
-  const auto is_occluder = [&](IVec3 offset) { return types.occludes(chunks.get(voxel + offset)); };
+  const auto is_filled = [&](std::uint8_t octant) {
+    const IVec3 at = voxel + Neighbourhood::offset(octant >> 3U);
+    const VoxelType type = chunks.get(at);
+    if (!types.is_shaped(type)) return types.occludes(type);
+    return types[type].visibility == Visibility::Opaque &&
+           (shape_at(chunks, types, at)->filled_octants >> (octant & 7U) & 1U) != 0;
+  };
   FaceOcclusion corners{};
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    const CornerNeighbours& at = kCornerNeighbours[static_cast<std::size_t>(direction)][i];
-    corners[i] = vertex_occlusion(is_occluder(at.side1), is_occluder(at.side2), is_occluder(at.corner));
+    const auto& [side1, side2, diagonal] = blocky::cube_occluders()[static_cast<std::size_t>(direction)][i];
+    corners[i] = vertex_occlusion(is_filled(side1), is_filled(side2), is_filled(diagonal));
   }
   return corners;
 }

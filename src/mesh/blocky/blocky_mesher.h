@@ -1,8 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <map>
 
+#include <quoin/core/axis_orientation.h>
 #include <quoin/core/direction.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/voxel_registry.h>
@@ -91,6 +95,40 @@ struct OcclusionTables {
       flips[8];  // by a quad's eight bits of occlusion: set if the quad is flipped; bit (occlusion + 6) % 32 of a word
 };
 
+// A voxel with a shape, of the chunk or next to it.
+struct ShapedVoxel {
+  IVec3 local{0};  // -1 to 64
+  VoxelType type = kAir;
+  bool darkens = false;  // its material is opaque
+  const ShapeModel* model = nullptr;
+};
+
+// The shaped voxels of a region and of the voxels around it.
+struct ShapedVoxels {
+  static constexpr int kEdge = kChunkEdge + 2;
+  static constexpr int kOctantStride = kChunkEdge + 16;
+  static constexpr std::size_t kRows = std::size_t{kEdge} * kEdge;
+
+  bool has_any = false;             // some chunk of the neighbourhood has some
+  bool is_in_centre = false;        // the centre has some
+  Layer cells;                      // in the z view's layout
+  Layer ends;                       // as View::ends
+  std::uint32_t first[kRows];       // by row_of: the number of voxels before the row
+  BlockVector<ShapedVoxel> voxels;  // by z, y, x
+  // Eighths of each voxel that darken corners (ShapeModel::filled_octants), by octants_at, if the corners' occlusion is
+  // wanted. Valid within two voxels of shaped ones.
+  BlockVector<std::uint8_t> octants;
+  bool has_octants = false;
+  QuadBuffer quads;  // of cubes next to shapes, which the kernel leaves out
+
+  static std::size_t row_of(int y, int z) { return static_cast<std::size_t>((z + 1) * kEdge + y + 1); }
+  static std::size_t octants_at(const IVec3& local) {
+    return row_of(local.y, local.z) * kOctantStride + static_cast<std::size_t>(local.x + 8);
+  }
+  // Returns the shaped voxel at a position within the region or next to it, or null.
+  [[nodiscard]] const ShapedVoxel* at(const IVec3& local) const;
+};
+
 struct Scratch {
   View z;           // planes z, rows y, bits x
   View y;           // planes y, rows z, bits x
@@ -111,6 +149,13 @@ struct Scratch {
   std::size_t quads;                   // written so far
 };
 
+// The property of types that layers of opaque voxels show.
+enum class LayerClass : std::uint8_t {
+  Sight,      // VoxelRegistry::visibility
+  Occlusion,  // VoxelRegistry::occlusion: of opaque voxels only occluders
+  Shape,      // opaque: types with shapes; transparent: all others
+};
+
 // The input of a kernel.
 struct Job {
   const Neighbourhood* chunks;
@@ -122,11 +167,17 @@ struct Job {
   bool one_type;         // all its voxels except air have one opaque type: the layers of equal types are not filled
   // Some opaque voxel of the 27 chunks does not occlude, and occlusion is wanted. Set only with `has_transparent`.
   bool has_unoccluding = false;
-  bool by_occlusion = false;  // the layers of opaque voxels have occluders only
+  ShapedVoxels* shapes = nullptr;  // not null: some voxel of the 27 chunks has a shape. Then `has_transparent`, too.
+  LayerClass by = LayerClass::Sight;
+  bool has_faces = false;  // the visible faces are found: the layers of opaque voxels serve occlusion alone
 
   // Returns the class of a type for the layers.
   [[nodiscard]] Visibility visibility(VoxelType type) const {
-    return by_occlusion ? types->occlusion(type) : types->visibility(type);
+    if (by == LayerClass::Sight) [[likely]]
+      return types->visibility(type);
+    if (by == LayerClass::Occlusion) return types->occlusion(type);
+    if (type == kAir) return Visibility::Air;
+    return types->is_shaped(type) ? Visibility::Opaque : Visibility::Transparent;
   }
   [[nodiscard]] bool is_opaque(VoxelType type) const { return visibility(type) == Visibility::Opaque; }
 };
@@ -158,6 +209,39 @@ bool hold_unoccluding(const Neighbourhood& chunks, const VoxelRegistry& types);
 // Removes, from `sides` and the z view's faces, the faces of transparent voxels that a voxel of the same type beyond
 // the chunk's border hides.
 void hide_faces_at_border(const Job& job, Scratch& scratch);
+
+// Appends the visible faces of the region's shapes. Requires: a kernel meshed the job.
+void append_shape_faces(const Job& job, ShapeFaceBuffer& out);
+
+// The orientations of types that their state turns, in quads.
+class TurnedTypes {
+ public:
+  // Sets the orientations of quads of such types. Splits those whose voxels look different.
+  void apply(const Chunk& chunk, const VoxelRegistry& types, QuadBuffer& quads);
+
+ private:
+  struct Looks {
+    VoxelFaces faces;
+    // By direction and index of an orientation: the first orientation that shows the same face.
+    std::array<std::array<std::uint8_t, AxisOrientation::kCount>, 6> first{};
+  };
+
+  [[nodiscard]] const Looks& looks_of(VoxelType type, const VoxelFaces& faces);
+  void append_parts(const Quad& quad, const Chunk& chunk, const StateOrientations& orientations, const Looks& looks);
+
+  std::map<VoxelType, Looks> looks_;
+  QuadBuffer made_;
+};
+
+// Lists the shaped voxels in and around the region from `shapes->cells`. `has_ends`: `shapes->ends` is valid.
+void list_shapes(const Job& job, bool has_ends);
+
+// Removes, from the layers of faces, the faces of cubes that shapes cover.
+void hide_faces_behind_shapes(const Job& job, Scratch& scratch);
+
+// Moves the faces of cubes whose corners shapes may darken from the layers of faces to `shapes->quads`, in the mesher's
+// order. Requires: the z view's opaque voxels are the occluders. `row_ends`: its ends are valid.
+void take_faces_next_to_shapes(const Job& job, bool row_ends, Scratch& scratch);
 
 }  // namespace quoin::blocky
 

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <map>
+#include <tuple>
+#include <unordered_map>
 #include <vector>
 
 #include <quoin/core/assert.h>
@@ -137,29 +140,53 @@ Error too_large() {
   return {ErrorCode::LimitExceeded, "the mesh needs more than 2^32 vertices", {}, {}};
 }
 
-// Reserves room for `quads` more quads.
-void grow(std::size_t quads, BlockyTriangles& out) {
-  const std::size_t vertices = out.positions.size() + vertices_needed(quads);
-  out.positions.resize(vertices);
-  out.directions.resize(vertices);
-  out.occlusion.resize(vertices);
-  out.types.resize(vertices);
-  out.indices.resize(out.indices.size() + indices_needed(quads));
+// The next vertex and index to write.
+struct Cursor {
+  std::size_t vertex = 0;
+  std::size_t index = 0;
+};
+
+// Makes room for more vertices and indices. Returns the place of the first.
+Cursor grow(std::size_t vertices, std::size_t indices, BlockyTriangles& out) {
+  const Cursor first{out.positions.size(), out.indices.size()};
+  const std::size_t total = first.vertex + vertices;
+  out.positions.resize(total);
+  out.directions.resize(total);
+  out.occlusion.resize(total);
+  out.types.resize(total);
+  out.indices.resize(first.index + indices);
+  return first;
 }
 
-// Writes the quad with index `number`.
-void put_quad(const Quad& quad, IVec3 origin, std::size_t number, BlockyTriangles& out) {
-  const std::size_t first = 4 * number;
-  QUOIN_ASSERT(first + 4 <= out.positions.size() && 6 * (number + 1) <= out.indices.size(), "a quad that was counted");
+void put_quad(const Quad& quad, IVec3 origin, Cursor& at, BlockyTriangles& out) {
+  QUOIN_ASSERT(at.vertex + 4 <= out.positions.size() && at.index + 6 <= out.indices.size(), "a quad that was counted");
   for_each_vertex({&quad, 1}, [&](std::size_t i, const QuadVertex& vertex) {
-    out.positions[first + i] = Vec3(origin + vertex.position);
-    out.directions[first + i] = vertex.direction;
-    out.occlusion[first + i] = vertex.occlusion;
-    out.types[first + i] = vertex.type;
+    out.positions[at.vertex + i] = Vec3(origin + vertex.position);
+    out.directions[at.vertex + i] = vertex.direction;
+    out.occlusion[at.vertex + i] = vertex.occlusion;
+    out.types[at.vertex + i] = vertex.type;
   });
-  std::uint32_t* index = out.indices.data() + 6 * number;
-  for (const std::uint8_t corner : triangle_corners(quad.flipped()))
-    *index++ = static_cast<std::uint32_t>(first) + corner;
+  std::uint32_t* index = out.indices.data() + at.index;
+  for (const std::uint8_t corner : triangle_corners(quad.flipped())) {
+    *index++ = static_cast<std::uint32_t>(at.vertex) + corner;
+  }
+  at.vertex += 4;
+  at.index += 6;
+}
+
+// Appends the triangles of a shape's face.
+void append_face(const ShapeFace& face, IVec3 origin, BlockyTriangles& out) {
+  const FaceOcclusion occlusion = face.occlusion();
+  const std::size_t corners = face.is_triangle() ? 3 : 4;
+  const auto first = static_cast<std::uint32_t>(out.positions.size());
+  for (std::size_t i = 0; i < corners; ++i) {
+    out.positions.push_back(Vec3(origin + face.voxel()) + face.model_face().corners[i]);
+    out.directions.push_back(face.model_face().direction);
+    out.occlusion.push_back(occlusion[i]);
+    out.types.push_back(face.type);
+  }
+  const std::array<std::uint8_t, 6>& order = triangle_corners(corners == 4 && flips_diagonal(occlusion));
+  for (std::size_t i = 0; i < (corners == 4 ? 6U : 3U); ++i) out.indices.push_back(first + order[i]);
 }
 
 void append_outline(const Quad& quad, IVec3 origin, const std::vector<OutlinePoint>& outline, BlockyTriangles& out) {
@@ -183,51 +210,114 @@ SurfaceClass surface_class(const VoxelProperties& properties) {
 
 namespace {
 
-/// Converts the quads of consecutive chunks to triangles.
+/// The faces of vertices that do not follow from type, direction and position (VertexLook), for one surface.
+class LookTable {
+ public:
+  /// Returns VertexLook::face of a face with a lifetime of this object, or of `faces` of a type that is turned.
+  [[nodiscard]] std::uint32_t number_of(const VoxelFace& face, BlockyTriangles& out) {
+    const auto [known, is_new] = by_address_.try_emplace(&face, 0);
+    if (is_new) known->second = add(face, out);
+    return known->second;
+  }
+  [[nodiscard]] std::uint32_t number_of(const Quad& quad, const VoxelFaces& faces, BlockyTriangles& out) {
+    const auto [known, is_new] =
+        turned_.try_emplace({quad.type(), quad.direction(), quad.orientation().index()}, std::uint32_t{0});
+    if (is_new) known->second = add(turned_face(faces, quad.direction(), quad.orientation()), out);
+    return known->second;
+  }
+
+ private:
+  static std::uint32_t add(const VoxelFace& face, BlockyTriangles& out) {
+    auto found = std::find(out.faces.begin(), out.faces.end(), face);
+    if (found == out.faces.end()) found = out.faces.insert(found, face);
+    return static_cast<std::uint32_t>(found - out.faces.begin()) + 1;
+  }
+
+  std::unordered_map<const VoxelFace*, std::uint32_t> by_address_;
+  std::map<std::tuple<VoxelType, Direction, int>, std::uint32_t> turned_;
+};
+
+/// Converts the quads and shapes of consecutive chunks to triangles.
 class ChunkTriangles {
  public:
   ChunkTriangles(const VoxelRegistry& types, bool watertight);
 
   /// Appends the triangles of one chunk, and counts its faces and quads. Errors: LimitExceeded if a surface class needs
-  /// more than about 2^32 vertices.
-  [[nodiscard]] Status append(const QuadBuffer& quads, IVec3 chunk, BlockyMesh& mesh);
+  /// more than about 2^32 vertices. Requires: one mesh for all chunks.
+  [[nodiscard]] Status append(const QuadBuffer& quads, const ShapeFaceBuffer* shapes, IVec3 chunk, BlockyMesh& mesh);
 
  private:
-  [[nodiscard]] SurfaceClass class_of(const Quad& quad) const;
-  [[nodiscard]] Status append_outlines(const QuadBuffer& quads, IVec3 origin, BlockyMesh& mesh);
+  using Counts = std::array<std::size_t, kSurfaceClasses>;
 
+  [[nodiscard]] SurfaceClass class_of(VoxelType type) const {
+    return type < classes_.size() ? classes_[type] : SurfaceClass::Opaque;
+  }
+  [[nodiscard]] Status append_quads(const QuadBuffer& quads, IVec3 origin, BlockyMesh& mesh);
+  [[nodiscard]] Status append_outlines(const QuadBuffer& quads, IVec3 origin, BlockyMesh& mesh);
+  [[nodiscard]] Status append_shapes(const ShapeFaceBuffer& shapes, IVec3 origin, BlockyMesh& mesh);
+  // Sets the looks of the vertices since `first` if the quad is turned.
+  void set_look(const Quad& quad, IVec3 origin, std::size_t first, std::size_t end, BlockyMesh& mesh);
+
+  const VoxelRegistry& types_;
   std::vector<SurfaceClass> classes_;  // [VoxelType]
   bool watertight_;
   OutlineFinder finder_;
   std::vector<OutlinePoint> outline_;
+  std::array<LookTable, kSurfaceClasses> looks_;
 };
 
 ChunkTriangles::ChunkTriangles(const VoxelRegistry& types, bool watertight)
-    : classes_(types.size()), watertight_(watertight) {
+    : types_(types), classes_(types.size()), watertight_(watertight) {
   for (std::size_t i = 0; i < classes_.size(); ++i) classes_[i] = surface_class(types[static_cast<VoxelType>(i)]);
 }
 
-SurfaceClass ChunkTriangles::class_of(const Quad& quad) const {
-  return quad.type() < classes_.size() ? classes_[quad.type()] : SurfaceClass::Opaque;
+Status ChunkTriangles::append(const QuadBuffer& quads, const ShapeFaceBuffer* shapes, IVec3 chunk, BlockyMesh& mesh) {
+  const std::size_t faces = shapes == nullptr ? 0 : shapes->size();
+  mesh.faces_visible += face_count(quads) + static_cast<std::int64_t>(faces);
+  mesh.quads += static_cast<std::int64_t>(quads.size() + faces);
+  const IVec3 origin = chunk * kChunkEdge;
+  Status done = watertight_ ? append_outlines(quads, origin, mesh) : append_quads(quads, origin, mesh);
+  if (done && faces > 0) done = append_shapes(*shapes, origin, mesh);
+  for (BlockyTriangles& surface : mesh.surfaces) {
+    if (!surface.looks.empty()) surface.looks.resize(surface.positions.size());
+  }
+  return done;
 }
 
-Status ChunkTriangles::append(const QuadBuffer& quads, IVec3 chunk, BlockyMesh& mesh) {
-  mesh.faces_visible += face_count(quads);
-  mesh.quads += static_cast<std::int64_t>(quads.size());
-  const IVec3 origin = chunk * kChunkEdge;
-  if (watertight_) return append_outlines(quads, origin, mesh);
-  std::array<std::size_t, kSurfaceClasses> counts{};
-  for (const Quad& quad : quads) ++counts[static_cast<std::size_t>(class_of(quad))];
-  std::array<std::size_t, kSurfaceClasses> next{};
+void ChunkTriangles::set_look(const Quad& quad, IVec3 origin, std::size_t first, std::size_t end, BlockyMesh& mesh) {
+  const VoxelFaces& faces = types_[quad.type()].faces;
+  if (faces.empty()) return;
+  const auto which = static_cast<std::size_t>(class_of(quad.type()));
+  BlockyTriangles& out = mesh.surfaces[which];
+  out.looks.resize(out.positions.size());
+  const std::uint32_t face = looks_[which].number_of(quad, faces, out);
+  const TextureFrame frame = texture_frame(out.faces[face - 1], quad.direction());
+  for (std::size_t i = first; i < end; ++i) {
+    out.looks[i].face = face;
+    out.looks[i].uv = texture_coordinates(frame, out.positions[i] - Vec3(origin + quad.voxel()));
+  }
+}
+
+Status ChunkTriangles::append_quads(const QuadBuffer& quads, IVec3 origin, BlockyMesh& mesh) {
+  Counts counts{};
+  for (const Quad& quad : quads) ++counts[static_cast<std::size_t>(class_of(quad.type()))];
+  std::array<Cursor, kSurfaceClasses> next{};
   for (std::size_t i = 0; i < kSurfaceClasses; ++i) {
     BlockyTriangles& out = mesh.surfaces[i];
-    next[i] = out.positions.size() / 4;
-    if (next[i] + counts[i] > kMaxVertices / 4) return too_large();
-    grow(counts[i], out);
+    if (out.positions.size() + vertices_needed(counts[i]) > kMaxVertices) return too_large();
+    next[i] = grow(vertices_needed(counts[i]), indices_needed(counts[i]), out);
   }
   for (const Quad& quad : quads) {
-    const auto which = static_cast<std::size_t>(class_of(quad));
-    put_quad(quad, origin, next[which]++, mesh.surfaces[which]);
+    const auto which = static_cast<std::size_t>(class_of(quad.type()));
+    put_quad(quad, origin, next[which], mesh.surfaces[which]);
+  }
+  if (!types_.has_turned_by_state()) return {};
+  // The vertices of each surface are in the order of its quads.
+  for (std::size_t i = 0; i < kSurfaceClasses; ++i) next[i].vertex -= vertices_needed(counts[i]);
+  for (const Quad& quad : quads) {
+    std::size_t& first = next[static_cast<std::size_t>(class_of(quad.type()))].vertex;
+    if (quad.orientation().index() != 0) set_look(quad, origin, first, first + 4, mesh);
+    first += 4;
   }
   return {};
 }
@@ -235,10 +325,34 @@ Status ChunkTriangles::append(const QuadBuffer& quads, IVec3 chunk, BlockyMesh& 
 Status ChunkTriangles::append_outlines(const QuadBuffer& quads, IVec3 origin, BlockyMesh& mesh) {
   finder_.prepare(quads);
   for (const Quad& quad : quads) {
-    BlockyTriangles& out = mesh.surfaces[static_cast<std::size_t>(class_of(quad))];
-    if (out.positions.size() > kMaxVertices) return too_large();
+    BlockyTriangles& out = mesh.surfaces[static_cast<std::size_t>(class_of(quad.type()))];
+    const std::size_t first = out.positions.size();
+    if (first > kMaxVertices) return too_large();
     finder_.outline(quad, outline_);
     append_outline(quad, origin, outline_, out);
+    if (quad.orientation().index() != 0) set_look(quad, origin, first, out.positions.size(), mesh);
+  }
+  return {};
+}
+
+Status ChunkTriangles::append_shapes(const ShapeFaceBuffer& shapes, IVec3 origin, BlockyMesh& mesh) {
+  for (const ShapeFace& face : shapes) {
+    const auto which = static_cast<std::size_t>(class_of(face.type));
+    BlockyTriangles& out = mesh.surfaces[which];
+    const std::size_t first = out.positions.size();
+    if (first > kMaxVertices) return too_large();
+    append_face(face, origin, out);
+    out.looks.resize(out.positions.size());
+    const ModelFace& shown = face.model_face();
+    const VoxelFace* const look = look_of(*face.model, shown, types_[face.type].faces);
+    const bool is_inclined = shown.normal != Vec3(normal_of(shown.direction));
+    const std::uint32_t number = look == nullptr ? 0 : looks_[which].number_of(*look, out);
+    for (std::size_t i = first; i < out.positions.size(); ++i) {
+      VertexLook& vertex = out.looks[i];
+      vertex.face = number;
+      if (look != nullptr) vertex.uv = texture_uv(shown, *look, shown.uv[i - first]);
+      if (is_inclined) vertex.normal = shown.normal;
+    }
   }
   return {};
 }
@@ -259,10 +373,16 @@ std::int64_t BlockyMesh::vertex_count() const {
 
 namespace {
 
-// Returns the quads of all chunks; fewer if `reporter` was cancelled.
-std::vector<QuadBuffer> quads_of(const Grid& grid, const std::vector<IVec3>& chunks, const VoxelRegistry& types,
-                                 const BlockyMeshOptions& options, Threads threads, ProgressSteps& reporter) {
-  std::vector<QuadBuffer> parts(chunks.size());
+struct ChunkFaces {
+  std::vector<QuadBuffer> quads;
+  std::vector<ShapeFaceBuffer> shapes;  // empty if no type has shapes
+};
+
+// Returns the faces of all chunks; fewer if `reporter` was cancelled.
+ChunkFaces faces_of(const Grid& grid, const std::vector<IVec3>& chunks, const VoxelRegistry& types,
+                    const BlockyMeshOptions& options, Threads threads, ProgressSteps& reporter) {
+  ChunkFaces parts{std::vector<QuadBuffer>(chunks.size()),
+                   std::vector<ShapeFaceBuffer>(types.has_shapes() ? chunks.size() : 0)};
   // Enough tasks to keep every thread busy; each task uses one mesher for its chunks.
   const std::size_t tasks = std::min<std::size_t>(chunks.size(), std::size_t{8} * thread_count(threads));
   parallel_for(tasks, threads, [&](std::size_t task) {
@@ -271,8 +391,13 @@ std::vector<QuadBuffer> quads_of(const Grid& grid, const std::vector<IVec3>& chu
     quad_options.merge = options.merge;
     quad_options.bake_occlusion = options.bake_occlusion;
     for (std::size_t i = task; i < chunks.size() && !reporter.cancelled(); i += tasks) {
-      mesher.mesh(grid.neighbourhood(chunks[i]), types, quad_options, parts[i]);
-      if (options.cut) options.cut(chunks[i], parts[i]);
+      const Neighbourhood near = grid.neighbourhood(chunks[i]);
+      if (parts.shapes.empty()) {
+        mesher.mesh(near, types, quad_options, parts.quads[i]);
+      } else {
+        mesher.mesh(near, types, quad_options, parts.quads[i], parts.shapes[i]);
+      }
+      if (options.cut) options.cut(chunks[i], parts.quads[i]);
       reporter.step();
     }
   });
@@ -282,11 +407,13 @@ std::vector<QuadBuffer> quads_of(const Grid& grid, const std::vector<IVec3>& chu
 }  // namespace
 
 Status append_triangles(std::span<const QuadBuffer> quads, std::span<const IVec3> chunks, const VoxelRegistry& types,
-                        bool watertight, BlockyMesh& mesh) {
+                        bool watertight, BlockyMesh& mesh, std::span<const ShapeFaceBuffer> shapes) {
   QUOIN_ASSERT(quads.size() == chunks.size(), "a chunk for each buffer of quads");
+  QUOIN_ASSERT(shapes.empty() || shapes.size() == chunks.size(), "a chunk for each buffer of shapes");
   ChunkTriangles triangles(types, watertight);
   for (std::size_t i = 0; i < quads.size(); ++i) {
-    if (auto done = triangles.append(quads[i], chunks[i], mesh); !done) return done;
+    const ShapeFaceBuffer* const own = shapes.empty() ? nullptr : &shapes[i];
+    if (auto done = triangles.append(quads[i], own, chunks[i], mesh); !done) return done;
   }
   return {};
 }
@@ -295,15 +422,17 @@ Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& type
                                      Threads threads, const Progress& progress) {
   const std::vector<IVec3> chunks = grid.chunks();
   ProgressSteps reporter(progress, 2 * chunks.size());
-  std::vector<QuadBuffer> parts = quads_of(grid, chunks, types, options, threads, reporter);
+  ChunkFaces parts = faces_of(grid, chunks, types, options, threads, reporter);
   if (reporter.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
 
   BlockyMesh mesh;
   mesh.faces_total = 6 * grid.voxel_count();
   ChunkTriangles triangles(types, options.watertight);
   for (std::size_t i = 0; i < chunks.size(); ++i) {
-    if (auto done = triangles.append(parts[i], chunks[i], mesh); !done) return done.error();
-    parts[i] = {};
+    ShapeFaceBuffer* const shapes = parts.shapes.empty() ? nullptr : &parts.shapes[i];
+    if (auto done = triangles.append(parts.quads[i], shapes, chunks[i], mesh); !done) return done.error();
+    parts.quads[i] = {};
+    if (shapes != nullptr) *shapes = {};
     reporter.step();
     if (reporter.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
   }
