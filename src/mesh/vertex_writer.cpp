@@ -7,9 +7,11 @@
 #include <cmath>
 #include <cstring>
 #include <initializer_list>
+#include <numeric>
 #include <optional>
 #include <utility>
 
+#include <glm/common.hpp>
 #include <quoin/core/assert.h>
 
 #include "core/srgb.h"
@@ -299,6 +301,30 @@ void put_uvs(VertexFormat format, std::span<const Quad> quads, const Column& col
   });
 }
 
+// Returns for each vertex of blocks the lowest corner of the face that contains it: of all triangles that share
+// vertices with its own. Coordinates relative to it are small, and exact in the samplers of clients.
+std::vector<Vec3> corners_of_faces(const MeshView& view) {
+  std::vector<std::uint32_t> face(view.positions.size());  // a vertex of the same face, at most its own index
+  std::iota(face.begin(), face.end(), 0U);
+  const auto first_of = [&](std::uint32_t vertex) {
+    for (; face[vertex] != vertex; vertex = face[vertex]) face[vertex] = face[face[vertex]];
+    return vertex;
+  };
+  for (std::size_t i = 0; i < view.indices.size(); i += 3) {
+    const std::array<std::uint32_t, 3> first = {first_of(view.indices[i]), first_of(view.indices[i + 1]),
+                                                first_of(view.indices[i + 2])};
+    for (const std::uint32_t each : first) face[first_of(each)] = std::min({first[0], first[1], first[2]});
+  }
+  std::vector<Vec3> corners(view.positions.begin(), view.positions.end());
+  const auto vertices = static_cast<std::uint32_t>(face.size());
+  for (std::uint32_t i = 0; i < vertices; ++i) {
+    const std::uint32_t first = first_of(i);
+    corners[first] = glm::min(corners[first], view.positions[i]);
+  }
+  for (std::uint32_t i = 0; i < vertices; ++i) corners[i] = glm::floor(corners[first_of(i)]);
+  return corners;
+}
+
 bool is_whole(Vec3 origin, float low, float high) {
   const auto fits = [&](float c) { return c == std::floor(c) && c >= low && c <= high; };
   return fits(origin.x) && fits(origin.y) && fits(origin.z);
@@ -369,14 +395,22 @@ void VertexWriter::read_faces(const VoxelRegistry& types, const TextureSet& text
 }
 
 std::array<std::array<float, 2>, 4> VertexWriter::texture_uvs(const Quad& quad) const {
-  const Direction direction = quad.direction();
-  const std::size_t number = face_number(quad.type(), direction);
-  const std::uint8_t turn = number < turns_.size() ? turns_[number] : std::uint8_t{0};
-  const TextureFrame& frame = texture_frames()[face_of(direction)][turn];
+  const TextureFrame& frame = texture_frames()[face_of(quad.direction())][turn(quad.type(), quad.direction())];
   const std::array<IVec3, 4> corners = corners_of(quad);
   std::array<std::array<float, 2>, 4> coordinates{};
   for (std::size_t i = 0; i < corners.size(); ++i) {
     coordinates[i] = texture_coordinates(frame, Vec3(corners[i] - quad.voxel()));
+  }
+  return coordinates;
+}
+
+std::vector<std::array<float, 2>> VertexWriter::texture_uvs(const MeshView& mesh) const {
+  const std::vector<Vec3> corners = corners_of_faces(mesh);
+  std::vector<std::array<float, 2>> coordinates(corners.size());
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const Direction direction = mesh.directions[i];
+    const TextureFrame& frame = texture_frames()[face_of(direction)][turn(mesh.types[i], direction)];
+    coordinates[i] = texture_coordinates(frame, mesh.positions[i] - corners[i]);
   }
   return coordinates;
 }
@@ -444,10 +478,21 @@ void VertexWriter::write(const MeshView& mesh, Vec3 origin, std::span<std::byte>
 
 void VertexWriter::write_view(const MeshView& mesh, Vec3 origin, std::span<std::byte> out) const {
   QUOIN_ASSERT(out.size() >= bytes_needed(mesh.positions.size()), "room for the vertices");
+  const auto has_uvs = [](const VertexElement& each) { return each.attribute == VertexAttribute::TextureUv; };
+  // A vertex's face is found by its triangles, so for all vertices at once.
+  std::vector<std::array<float, 2>> uvs;
+  if (std::ranges::any_of(layout_.elements, has_uvs)) uvs = texture_uvs(mesh);
   by_blocks(mesh.positions.size(), 1, layout_.stride, out.data(),
             [&](std::size_t first, std::size_t count, std::byte* block) {
               for (std::size_t i = 0; i < layout_.elements.size(); ++i) {
-                write_element(i, mesh, first, count, origin, block);
+                const VertexElement& element = layout_.elements[i];
+                if (!has_uvs(element)) {
+                  write_element(i, mesh, first, count, origin, block);
+                  continue;
+                }
+                const Column column{block + element.offset, layout_.stride};
+                PerVertex{column, count, [&](std::size_t k) { return uvs[first + k]; }}.put<std::array<float, 2>>(
+                    [](const std::array<float, 2>& uv) { return uv; });
               }
             });
 }
@@ -484,9 +529,9 @@ void VertexWriter::write_element(std::size_t index, const MeshView& mesh, std::s
       return put_encoded(format, vertices([&](auto i) -> const Colour& {
                            return colour(index, face_number(mesh.types[first + i], mesh.directions[first + i]));
                          }));
-    case VertexAttribute::Uv:
-    case VertexAttribute::TextureUv:
-      return;  // no view has any
+    case VertexAttribute::Uv:         // no view has any
+    case VertexAttribute::TextureUv:  // written by write_view
+      return;
   }
 }
 
@@ -537,7 +582,7 @@ bool can_write(const VertexElement& element, VertexSource source) {
     case VertexAttribute::Texture:
       return !is_smooth && is_one_of(format, {Uint16, Uint32});
     case VertexAttribute::TextureUv:
-      return source == VertexSource::Quads && format == Float32x2;
+      return !is_smooth && format == Float32x2;
     case VertexAttribute::Tint:
       return !is_smooth && is_one_of(format, {Float32x4, Unorm16x4, Unorm8x4, Unorm8x4Srgb});
   }

@@ -152,7 +152,8 @@ TEST(VertexWriter, WritesTexturesOfFaces) {
                             {{VertexAttribute::Texture, Uint32, 0},
                              {VertexAttribute::TextureUv, Float32x2, 4},
                              {VertexAttribute::Tint, Unorm8x4Srgb, 12}}};
-  ASSERT_TRUE(can_write(layout, VertexSource::Quads) && !can_write(layout, VertexSource::Blocks));
+  ASSERT_TRUE(can_write(layout, VertexSource::Quads));
+  ASSERT_FALSE(can_write(layout, VertexSource::Smooth));
   const VertexWriter writer(layout, types, textures);
   Grid grid;
   std::mt19937 random(2);
@@ -189,13 +190,17 @@ TEST(VertexWriter, WritesTexturesOfViewsAndOfOneArray) {
   VoxelRegistry types;
   const Texture first = Texture::from_image("a", noise(16, 1)).value();
   const Texture second = Texture::from_image("b", noise(16, 2)).value();
-  const VoxelFace tinted{.texture = second, .tint = {9, 8, 7, 6}};
+  const VoxelFace tinted{.texture = second, .turn = 1, .mirrored = true, .tint = {9, 8, 7, 6}};
   const VoxelType type = types.add({.name = "block", .faces = {{first}, tinted, {first}}}).value();
   TextureSet textures;
   textures.add(types);
-  const VertexLayout layout{6, {{VertexAttribute::Texture, Uint16, 0}, {VertexAttribute::Tint, Unorm8x4Srgb, 2}}};
+  const VertexLayout layout{14,
+                            {{VertexAttribute::Texture, Uint16, 0},
+                             {VertexAttribute::Tint, Unorm8x4Srgb, 2},
+                             {VertexAttribute::TextureUv, Float32x2, 6}}};
+  ASSERT_TRUE(can_write(layout, VertexSource::Blocks));
   Grid grid;
-  grid.set({1, 2, 3}, type);
+  grid.fill_box({{1, 2, 3}, {4, 4, 70}}, type);
   const auto mesh = build_blocky_mesh(grid, types, {});
   const MeshView view = view_of(mesh->surfaces[0], SurfaceClass::Opaque);
   for (const bool has_textures : {false, true}) {
@@ -205,8 +210,8 @@ TEST(VertexWriter, WritesTexturesOfViewsAndOfOneArray) {
     for (std::size_t i = 0; i < view.positions.size(); ++i) {
       const bool is_top = view.directions[i] == Direction::PosY;
       const int layer = is_top ? 1 : 0;
-      EXPECT_EQ(read<std::uint16_t>(bytes, 6 * i), has_textures ? layer : 0xFFFF);
-      EXPECT_EQ(read<Rgba8>(bytes, 6 * i + 2), (is_top ? Rgba8{9, 8, 7, 255} : Rgba8{255, 255, 255, 255}));
+      EXPECT_EQ(read<std::uint16_t>(bytes, 14 * i), has_textures ? layer : 0xFFFF);
+      EXPECT_EQ(read<Rgba8>(bytes, 14 * i + 2), (is_top ? Rgba8{9, 8, 7, 255} : Rgba8{255, 255, 255, 255}));
     }
     EXPECT_EQ(bytes, written(grid, types, writer, SurfaceClass::Opaque).vertices);
   }

@@ -35,7 +35,8 @@ enum class VertexAttribute : std::uint8_t {
   /// layers or arrays from 65,536.
   Texture,
   /// Texture coordinates from the upper left corner, rightwards and downwards, with the face's turn and mirror:
-  /// `texture_coordinates` relative to the quad's voxel, -64 to 64. They repeat with every voxel.
+  /// `texture_coordinates` relative to the quad's voxel, -64 to 64. They repeat with every voxel. Of blocks: relative
+  /// to the lowest corner of the face, which all triangles that share vertices form.
   TextureUv,
   /// Tint of the face; for types without textures their colour. The face shows tint times texture.
   Tint,
@@ -93,7 +94,7 @@ struct VertexLayout {
 /// Source of vertices.
 enum class VertexSource : std::uint8_t {
   Quads,        ///< has all attributes
-  Blocks,       ///< MeshView of blocks: all except Uv and TextureUv; positions as floats
+  Blocks,       ///< MeshView of blocks: all except Uv; positions as floats
   SmoothChunk,  ///< SmoothChunkMesh: Position as floats, Normal, Brightness
   Smooth,       ///< MeshView of a smooth mesh: as SmoothChunk, plus Colour
 };
@@ -156,7 +157,12 @@ class VertexWriter {
     const std::size_t number = face_number(type, direction);
     return number < textures_.size() ? textures_[number] : ~std::uint32_t{0};
   }
+  [[nodiscard]] std::uint8_t turn(VoxelType type, Direction direction) const {
+    const std::size_t number = face_number(type, direction);
+    return number < turns_.size() ? turns_[number] : std::uint8_t{0};
+  }
   [[nodiscard]] std::array<std::array<float, 2>, 4> texture_uvs(const Quad& quad) const;
+  [[nodiscard, gnu::visibility("hidden")]] std::vector<std::array<float, 2>> texture_uvs(const MeshView& mesh) const;
   void read_faces(const VoxelRegistry& types, const TextureSet& textures);
 
   VertexLayout layout_;
