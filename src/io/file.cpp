@@ -169,8 +169,9 @@ Result<AtomicFile> AtomicFile::create(const std::filesystem::path& path) {
   }
   constexpr unsigned kAttempts = 100;
   for (unsigned attempt = 0; attempt < kAttempts && file.descriptor_ < 0; ++attempt) {
-    file.temporary_ = temporary_name(file.path_, attempt);
-    file.descriptor_ = ::open(file.temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    std::filesystem::path name = temporary_name(file.path_, attempt);
+    file.descriptor_ = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (file.descriptor_ >= 0) file.temporary_ = std::move(name);  // before: another writer's file
     if (file.descriptor_ < 0 && errno != EEXIST) break;
   }
   if (file.descriptor_ < 0) return cannot_write(reason(errno), path);
@@ -181,7 +182,7 @@ Result<AtomicFile> AtomicFile::create(const std::filesystem::path& path) {
 
 AtomicFile::AtomicFile(AtomicFile&& other) noexcept
     : path_(std::move(other.path_)),
-      temporary_(std::move(other.temporary_)),
+      temporary_(std::exchange(other.temporary_, {})),
       descriptor_(std::exchange(other.descriptor_, -1)),
       failed_(other.failed_) {}
 
@@ -189,7 +190,7 @@ AtomicFile& AtomicFile::operator=(AtomicFile&& other) noexcept {
   if (this == &other) return *this;
   discard();
   path_ = std::move(other.path_);
-  temporary_ = std::move(other.temporary_);
+  temporary_ = std::exchange(other.temporary_, {});
   descriptor_ = std::exchange(other.descriptor_, -1);
   failed_ = other.failed_;
   return *this;
@@ -200,9 +201,9 @@ AtomicFile::~AtomicFile() {
 }
 
 void AtomicFile::discard() noexcept {
-  if (descriptor_ < 0) return;
-  ::close(std::exchange(descriptor_, -1));
-  ::unlink(temporary_.c_str());
+  if (descriptor_ >= 0) ::close(std::exchange(descriptor_, -1));
+  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+  temporary_.clear();
 }
 
 Status AtomicFile::write(std::span<const std::byte> bytes) {
@@ -219,23 +220,31 @@ Status AtomicFile::write(std::span<const std::byte> bytes) {
   return {};
 }
 
-Status AtomicFile::commit() {
-  if (descriptor_ < 0 || failed_) {
-    discard();
-    return cannot_write("an earlier write failed", path_);
-  }
+Status AtomicFile::finish() {
+  if (temporary_.empty() || failed_) return cannot_write("an earlier write failed", path_);
+  if (descriptor_ < 0) return {};
   const int synced = ::fsync(descriptor_);
   const int sync_error = errno;
   const int closed = ::close(std::exchange(descriptor_, -1));
   const int close_error = errno;
   // EINVAL: this kind of file cannot be synced (some network and virtual file systems).
   const bool sync_failed = synced != 0 && sync_error != EINVAL;
-  int error = sync_failed ? sync_error : closed != 0 ? close_error : 0;
-  if (error == 0 && ::rename(temporary_.c_str(), path_.c_str()) != 0) error = errno;
-  if (error != 0) {
-    ::unlink(temporary_.c_str());
+  failed_ = sync_failed || closed != 0;
+  if (failed_) return cannot_write(reason(sync_failed ? sync_error : close_error), path_);
+  return {};
+}
+
+Status AtomicFile::commit() {
+  if (Status finished = finish(); !finished) {
+    discard();
+    return finished;
+  }
+  if (::rename(temporary_.c_str(), path_.c_str()) != 0) {
+    const int error = errno;
+    discard();
     return cannot_write(reason(error), path_);
   }
+  temporary_.clear();
   sync_folder(path_.parent_path());
   return {};
 }

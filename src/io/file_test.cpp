@@ -194,6 +194,42 @@ TEST_F(FileTest, NumbersKeptBackups) {
   EXPECT_EQ(FileBackup::name_for(folder_ / "nothing"), fs::path());
 }
 
+// Returns the number that the next file to be opened gets.
+int next_descriptor() {
+  const int descriptor = ::open("/", O_RDONLY | O_CLOEXEC);
+  ::close(descriptor);
+  return descriptor;
+}
+
+TEST_F(FileTest, FinishedFileWaitsClosedForItsCommit) {
+  const fs::path path = folder_ / "a";
+  ASSERT_TRUE(write_file(bytes_in("old"), path));
+  const int free = next_descriptor();
+  {
+    auto left = AtomicFile::create(path);
+    ASSERT_TRUE(left && left->write(bytes_in("left")) && left->finish());
+    EXPECT_EQ(next_descriptor(), free);
+    AtomicFile moved = std::move(*left);
+    EXPECT_EQ(entries(), 2U);
+  }
+  EXPECT_EQ(content(path), "old");
+  EXPECT_EQ(entries(), 1U);
+  auto file = AtomicFile::create(path);
+  ASSERT_TRUE(file);
+  ASSERT_TRUE(file->write(bytes_in("new")));
+  ASSERT_TRUE(file->finish());
+  EXPECT_TRUE(file->finish());
+  EXPECT_FALSE(file->write(bytes_in("later")));
+  EXPECT_EQ(next_descriptor(), free);
+  EXPECT_EQ(content(path), "old");
+  AtomicFile moved = std::move(*file);
+  EXPECT_FALSE(file->commit());
+  ASSERT_TRUE(moved.commit());
+  EXPECT_FALSE(moved.finish());
+  EXPECT_EQ(content(path), "new");
+  EXPECT_EQ(entries(), 1U);
+}
+
 TEST_F(FileTest, CommitsMovedFile) {
   const fs::path path = folder_ / "a";
   auto first = AtomicFile::create(path);

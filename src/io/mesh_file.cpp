@@ -173,6 +173,8 @@ Result<std::uint64_t> write_files(const std::vector<MeshFile>& files, const Prog
     auto more = write_to(sink, file, progress);
     if (!more) return more;
     bytes += *more;
+    // Closed: there may be more files than a process may open.
+    if (auto finished = target->finish(); !finished) return finished.error();
     written.push_back(std::move(*target));
   }
   for (AtomicFile& file : written) {

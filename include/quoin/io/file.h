@@ -59,9 +59,13 @@ class AtomicFile {
   AtomicFile& operator=(AtomicFile&& other) noexcept;
   ~AtomicFile();
 
-  /// Appends bytes. Errors: CannotWrite (disk full); `commit` then fails too.
+  /// Appends bytes. Errors: CannotWrite (disk full), and `commit` then fails too; CannotWrite after `finish`.
   [[nodiscard]] Status write(std::span<const std::byte> bytes);
-  /// Replaces `path` with the new file. Errors: CannotWrite; the old file stays unchanged.
+  /// Syncs and closes the temporary file, so that many files can wait for their commits without being open. Optional.
+  /// Errors: CannotWrite; `commit` then fails too.
+  [[nodiscard]] Status finish();
+  /// Finishes the new file, if it is not finished, and replaces `path` with it. Errors: CannotWrite; the old file stays
+  /// unchanged.
   [[nodiscard]] Status commit();
 
  private:
@@ -69,7 +73,7 @@ class AtomicFile {
   void discard() noexcept;
 
   std::filesystem::path path_;
-  std::filesystem::path temporary_;
+  std::filesystem::path temporary_;  // empty: committed, discarded or moved from
   int descriptor_ = -1;
   bool failed_ = false;
 };

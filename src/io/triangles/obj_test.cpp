@@ -1,3 +1,6 @@
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -300,6 +303,45 @@ TEST_F(Obj, RepeatsTexturesOnFaces) {
   const auto files = mesh_files(meshes_, folder_.file("my model.obj")).value();
   for (const auto& file : files) EXPECT_TRUE(std::filesystem::exists(file)) << file;
   EXPECT_EQ(files.size(), folder_.count());
+}
+
+// Lowers the number of files that the process may open.
+class OpenFiles {
+ public:
+  explicit OpenFiles(int more) {
+    EXPECT_EQ(::getrlimit(RLIMIT_NOFILE, &before_), 0);
+    const int next = ::dup(0);
+    EXPECT_GE(next, 0);
+    ::close(next);
+    const rlimit lower{static_cast<rlim_t>(next + more), before_.rlim_max};
+    EXPECT_EQ(::setrlimit(RLIMIT_NOFILE, &lower), 0);
+  }
+  ~OpenFiles() { ::setrlimit(RLIMIT_NOFILE, &before_); }
+  OpenFiles(const OpenFiles&) = delete;
+  OpenFiles& operator=(const OpenFiles&) = delete;
+
+ private:
+  rlimit before_{};
+};
+
+TEST_F(Obj, NeedsFewOpenFilesForManyTextures) {
+  constexpr int kTextures = 40;
+  for (int i = 0; i < kTextures; ++i) {
+    AlphaImage image{16, 16, std::vector<std::uint8_t>(std::size_t{16} * 16 * 4, 255)};
+    image.rgba[0] = static_cast<std::uint8_t>(i);
+    const auto texture = Texture::from_image("t", image);
+    const auto type = scene_.types.add({.name = "block", .faces = texture.value()});
+    scene_.edit(grid_).grid.set({i, 9, 0}, type.value());
+  }
+  place({0, 0, 0});
+  meshes_ = *mesh_scene(scene_);
+  {
+    const OpenFiles few(10);
+    const auto bytes = write_mesh(meshes_, folder_.file("out.obj"));
+    ASSERT_TRUE(bytes) << to_string(bytes.error());
+  }
+  EXPECT_EQ(folder_.count(), kTextures + 4U);  // .obj, .mtl, the palette and emission
+  EXPECT_TRUE(decode_png(*read_file(folder_.file("out_texture_40.png"))));
 }
 
 TEST_F(Obj, FailuresLeaveNoFile) {
