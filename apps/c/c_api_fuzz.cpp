@@ -21,8 +21,9 @@ namespace {
 
 constexpr std::size_t kRoom = 1 << 14;  // bytes of memory for arrays
 constexpr int kMostCalls = 48;
-constexpr std::uint8_t kLater = 251;  // the first byte of calls that were added later
-constexpr int kMostLongCalls = 1;     // the slowest calls: smooth voxels, path-traced images, maps of 2^24 voxels
+constexpr std::uint8_t kTextures = 250;  // the byte of calls for textures
+constexpr std::uint8_t kLater = 251;     // the first byte of calls that were added later
+constexpr int kMostLongCalls = 1;        // the slowest calls: smooth voxels, path-traced images, maps of 2^24 voxels
 
 class Program {
  public:
@@ -152,6 +153,8 @@ class Program {
       if (data.types != nullptr) sum += data.types[i];
       if (data.occlusion != nullptr) sum += static_cast<double>(data.occlusion[i]);
       if (data.colours != nullptr) sum += data.colours[4 * i + 3];
+      if (data.textures != nullptr) sum += data.textures[i] % 7 + data.tints[4 * i + 3];
+      if (data.texture_uvs != nullptr) sum += static_cast<double>(data.texture_uvs[2 * i + 1]);
     }
     for (std::size_t i = 0; i < 4 * data.interface_count; ++i) sum += static_cast<double>(data.interfaces[i] & 1);
     sink_ = sum;
@@ -168,6 +171,33 @@ class Program {
     one.ior = bit() ? 0.0F : single();
     std::uint16_t number = 0;
     took(quoin_type_add(handle(), perhaps(&one), perhaps(&number)));
+  }
+
+  void textures() {
+    constexpr std::array<std::int32_t, 7> kTexels = {16, 32, 64, 17, 0, -16, 2048};
+    static const std::vector<std::uint8_t> kOpaque(kRoom, 255);
+    auto first = made<quoin_face>();
+    first.name[0] = static_cast<char>('a' + byte() % 2);
+    first.rgba = perhaps(bit() ? room_.data() : kOpaque.data());
+    first.texels = kTexels.at(byte() % (bit() ? 2 : kTexels.size()));
+    first.turn = byte() % 5;
+    first.mirrored = bit() ? 1 : 0;
+    first.alpha = byte() % 4;
+    first.has_tint = bit() ? 1 : 0;
+    first.tint[1] = byte();
+    std::array<quoin_face, 6> faces{};
+    faces.fill(first);
+    if (bit()) faces[4].texels = 16;
+    took(quoin_type_set_faces(handle(), index(), perhaps(faces.data())));
+    took(quoin_scene_textures(handle(), index(), &textures_), &textures_);
+    const quoin_textures from = bit() ? textures_ : handle();
+    std::size_t count = 0;
+    took(quoin_textures_array_count(from, perhaps(&count)));
+    auto array = made<quoin_texture_array>();
+    took(quoin_textures_array_get(from, index(), &array));
+    std::array<std::uint8_t, 5'000> rgba{};
+    took(quoin_textures_read(from, index(), small(), perhaps(rgba.data()), rgba.size()));
+    took(quoin_textures_faces(from, index(), perhaps(faces.data()), perhaps(&count)));
   }
 
   void instance() {
@@ -421,6 +451,7 @@ class Program {
     options.smooth = byte() % 2 != 0 && may_take_long() ? 1 : 0;
     options.threads = threads();
     options.watertight = options.threads % 2;
+    if (options.size == sizeof options) options.textures = textures_;
     const std::uint8_t which = byte() % 3;
     if (which == 0) {
       took(quoin_grid_mesh(handle(), index(), perhaps(&options), &out), &out);
@@ -439,6 +470,7 @@ class Program {
   void step() {
     quoin_scene scene = 0;
     const std::uint8_t which = byte();
+    if (which == kTextures) return textures();
     if (which >= kLater) return step_of_later(which);
     switch (which % 14) {
       case 0:
@@ -493,6 +525,7 @@ class Program {
   const std::uint8_t* end_;
   std::array<std::uint8_t, kRoom> room_{};
   std::vector<std::uint64_t> handles_;
+  quoin_textures textures_ = 0;  // the last ones
   int left_ = 0;
   int long_calls_ = 0;
   double sink_ = 0.0;

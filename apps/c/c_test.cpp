@@ -336,6 +336,242 @@ TEST(C, WeighsGridsAndPieces) {
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
+std::vector<std::uint8_t> texels(int size, std::uint8_t seed) {
+  std::vector<std::uint8_t> rgba;
+  for (int i = 0; i < 4 * size * size; ++i) rgba.push_back(i % 4 == 3 ? 255 : static_cast<std::uint8_t>(i * 7 + seed));
+  return rgba;
+}
+
+class CTextures : public testing::Test {
+ protected:
+  CTextures() : scene_(made_scene(voxels_)), stone_(texels(16, 1)), moss_(texels(32, 5)) {
+    faces_.fill(sized<quoin_face>());
+    for (quoin_face& face : faces_) {
+      std::strcpy(face.name, "stone");
+      face.rgba = stone_.data();
+      face.texels = 16;
+    }
+    std::strcpy(faces_[2].name, "moss");  // +Y
+    faces_[2].rgba = moss_.data();
+    faces_[2].texels = 32;
+    faces_[2].turn = 1;
+    faces_[2].mirrored = 1;
+    faces_[2].has_tint = 1;
+    faces_[2].tint[0] = 255;
+    faces_[2].tint[1] = 128;
+  }
+  ~CTextures() override { EXPECT_EQ(quoin_free(scene_), QUOIN_OK); }
+  CTextures(const CTextures&) = delete;
+  CTextures& operator=(const CTextures&) = delete;
+
+  quoin_textures textures(std::size_t max_layers = 0) {
+    quoin_textures made = 0;
+    EXPECT_EQ(quoin_scene_textures(scene_, max_layers, &made), QUOIN_OK) << quoin_last_error();
+    return made;
+  }
+
+  std::vector<std::uint16_t> voxels_;
+  quoin_scene scene_;
+  std::vector<std::uint8_t> stone_;
+  std::vector<std::uint8_t> moss_;
+  std::array<quoin_face, 6> faces_{};
+};
+
+TEST_F(CTextures, OfTypesCanBeRead) {
+  ASSERT_EQ(quoin_type_set_faces(scene_, 1, faces_.data()), QUOIN_OK) << quoin_last_error();
+  const quoin_textures made = textures();
+  std::array<quoin_face, 6> read{};
+  read.fill(sized<quoin_face>());
+  std::size_t count = 9;
+  ASSERT_EQ(quoin_textures_faces(made, 1, read.data(), &count), QUOIN_OK) << quoin_last_error();
+  ASSERT_EQ(count, 6U);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(read[i].size, sizeof(quoin_face));
+    EXPECT_STREQ(read[i].name, faces_[i].name);
+    EXPECT_EQ(read[i].texels, faces_[i].texels);
+    EXPECT_TRUE(std::equal(read[i].rgba, read[i].rgba + 4 * read[i].texels * read[i].texels, faces_[i].rgba));
+    EXPECT_EQ(read[i].turn, faces_[i].turn);
+    EXPECT_EQ(read[i].mirrored, faces_[i].mirrored);
+    EXPECT_EQ(read[i].has_tint, faces_[i].has_tint);
+    EXPECT_EQ(read[i].alpha, QUOIN_FACE_OPAQUE);
+    EXPECT_EQ(read[i].texture, i == 2 ? 0x10000U : 0U);
+  }
+  EXPECT_EQ(read[2].tint[1], 128);
+  ASSERT_EQ(quoin_textures_faces(made, 2, read.data(), &count), QUOIN_OK);
+  EXPECT_EQ(count, 0U);
+  // They belong to the handle: changes of the scene do not affect them.
+  ASSERT_EQ(quoin_type_set_faces(scene_, 1, nullptr), QUOIN_OK);
+  EXPECT_TRUE(std::equal(stone_.begin(), stone_.end(), read[0].rgba));
+  const quoin_textures none = textures();
+  ASSERT_EQ(quoin_textures_faces(none, 1, read.data(), &count), QUOIN_OK);
+  EXPECT_EQ(count, 0U);
+  EXPECT_EQ(quoin_free(none), QUOIN_OK);
+  EXPECT_EQ(quoin_free(made), QUOIN_OK);
+  EXPECT_EQ(quoin_textures_faces(made, 1, read.data(), &count), QUOIN_BAD_HANDLE);
+}
+
+TEST_F(CTextures, AreLayersOfArrays) {
+  std::vector<std::uint8_t> sand = texels(16, 9);
+  ASSERT_EQ(quoin_type_set_faces(scene_, 1, faces_.data()), QUOIN_OK);
+  for (quoin_face& face : faces_) face.rgba = sand.data();
+  faces_[2].rgba = moss_.data();
+  ASSERT_EQ(quoin_type_set_faces(scene_, 2, faces_.data()), QUOIN_OK);
+  const quoin_textures made = textures();
+  std::size_t count = 0;
+  ASSERT_EQ(quoin_textures_array_count(made, &count), QUOIN_OK);
+  ASSERT_EQ(count, 2U);
+  auto array = sized<quoin_texture_array>();
+  ASSERT_EQ(quoin_textures_array_get(made, 0, &array), QUOIN_OK);
+  EXPECT_EQ(array.texels, 16);
+  EXPECT_EQ(array.levels, 5);
+  ASSERT_EQ(array.layers, 2U);
+  std::vector<std::uint8_t> rgba(2 * stone_.size());
+  ASSERT_EQ(quoin_textures_read(made, 0, 0, rgba.data(), rgba.size()), QUOIN_OK);
+  EXPECT_TRUE(std::equal(stone_.begin(), stone_.end(), rgba.begin()));
+  EXPECT_TRUE(std::equal(sand.begin(), sand.end(), rgba.begin() + static_cast<std::ptrdiff_t>(stone_.size())));
+  ASSERT_EQ(quoin_textures_read(made, 0, 4, rgba.data(), 8), QUOIN_OK);  // one texel each
+  EXPECT_EQ(quoin_textures_read(made, 0, 4, rgba.data(), 7), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_textures_read(made, 0, 5, rgba.data(), rgba.size()), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_textures_read(made, 0, -1, rgba.data(), rgba.size()), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_textures_read(made, 2, 0, rgba.data(), rgba.size()), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_textures_read(made, 0, 0, nullptr, rgba.size()), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_textures_array_get(made, 2, &array), QUOIN_INVALID_ARGUMENT);
+  const quoin_textures split = textures(1);
+  ASSERT_EQ(quoin_textures_array_count(split, &count), QUOIN_OK);
+  EXPECT_EQ(count, 3U);
+  EXPECT_EQ(quoin_free(split), QUOIN_OK);
+  EXPECT_EQ(quoin_free(made), QUOIN_OK);
+}
+
+TEST_F(CTextures, OfMeshesHaveNumbersCoordinatesAndTints) {
+  ASSERT_EQ(quoin_type_set_faces(scene_, 1, faces_.data()), QUOIN_OK);
+  const std::vector<std::uint8_t> bar(3, 1);  // 3 x 1 x 1 voxels
+  auto array = sized<quoin_array>();
+  array.data = bar.data();
+  array.shape[0] = 3;
+  array.shape[1] = array.shape[2] = 1;
+  array.origin[0] = 9.0;
+  std::size_t grid = 0;
+  ASSERT_EQ(quoin_grid_add(scene_, &array, nullptr, &grid), QUOIN_OK) << quoin_last_error();
+  const quoin_textures split = textures(1);
+  for (const quoin_textures numbers : {quoin_textures{0}, split}) {
+    for (const int watertight : {0, 1}) {
+      auto options = sized<quoin_mesh_options>();
+      options.textures = numbers;
+      options.watertight = watertight;
+      quoin_mesh mesh = 0;
+      ASSERT_EQ(quoin_grid_mesh(scene_, grid, &options, &mesh), QUOIN_OK) << quoin_last_error();
+      auto data = sized<quoin_mesh_data>();
+      ASSERT_EQ(quoin_mesh_view(mesh, &data), QUOIN_OK);
+      ASSERT_NE(data.textures, nullptr);
+      for (std::size_t i = 0; i < data.vertex_count; ++i) {
+        const float* const at = data.positions + 3 * i;
+        const float* const uv = data.texture_uvs + 2 * i;
+        const bool is_top = data.normals[3 * i + 1] > 0.5F;
+        EXPECT_EQ(data.textures[i], is_top ? 0x10000U : 0U);
+        EXPECT_EQ(data.tints[4 * i + 1], is_top ? 128 : 255);
+        if (data.normals[3 * i + 2] > 0.5F) {  // +Z: right is +X, down is -Y
+          EXPECT_EQ(uv[0], at[0]);
+          EXPECT_EQ(uv[1], -at[1]);
+        } else if (is_top) {  // right is +Z and down -X; turned: -X and -Z; mirrored: +X and -Z
+          EXPECT_EQ(uv[0], at[0]);
+          EXPECT_EQ(uv[1], -at[2]);
+        }
+      }
+      EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
+    }
+  }
+  // Untextured types show their colours; smooth surfaces have no textures.
+  auto options = sized<quoin_mesh_options>();
+  quoin_mesh mesh = 0;
+  ASSERT_EQ(quoin_grid_mesh(scene_, 0, &options, &mesh), QUOIN_OK);
+  auto data = sized<quoin_mesh_data>();
+  ASSERT_EQ(quoin_mesh_view(mesh, &data), QUOIN_OK);
+  std::size_t plain = 0;
+  for (std::size_t i = 0; i < data.vertex_count; ++i) {
+    if (data.types[i] != 2) continue;
+    ++plain;
+    EXPECT_EQ(data.textures[i], QUOIN_NO_TEXTURE);
+    EXPECT_TRUE(std::equal(data.tints + 4 * i, data.tints + 4 * i + 4, data.colours + 4 * i));
+  }
+  EXPECT_GT(plain, 0U);
+  EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
+  options.smooth = 1;
+  ASSERT_EQ(quoin_grid_mesh(scene_, 0, &options, &mesh), QUOIN_OK);
+  ASSERT_EQ(quoin_mesh_view(mesh, &data), QUOIN_OK);
+  EXPECT_EQ(data.textures, nullptr);
+  EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
+  EXPECT_EQ(quoin_free(split), QUOIN_OK);
+}
+
+TEST_F(CTextures, GiveTypesTheirMeanColour) {
+  auto type = sized<quoin_type>();
+  std::vector<std::uint8_t> half = texels(16, 0);
+  for (std::size_t i = 0; i < half.size(); ++i) half[i] = i % 4 == 3 ? (i % 8 == 3 ? 255 : 0) : 90;
+  for (quoin_face& face : faces_) {
+    face = faces_[0];
+    face.rgba = half.data();
+    face.alpha = QUOIN_FACE_CUTOUT;
+  }
+  EXPECT_EQ(quoin_type_set_faces(scene_, 1, faces_.data()), QUOIN_INVALID_ARGUMENT);
+  EXPECT_NE(std::string(quoin_last_error()).find("transparent"), std::string::npos) << quoin_last_error();
+  type.rgba[3] = 100;
+  std::uint16_t leaves = 0;
+  ASSERT_EQ(quoin_type_add(scene_, &type, &leaves), QUOIN_OK);
+  ASSERT_EQ(quoin_type_set_faces(scene_, leaves, faces_.data()), QUOIN_OK) << quoin_last_error();
+  ASSERT_EQ(quoin_type_get(scene_, leaves, &type), QUOIN_OK);
+  EXPECT_EQ(type.rgba[0], 90);
+  EXPECT_EQ(type.rgba[3], 128);
+  // Files of voxels keep textures.
+  ASSERT_EQ(quoin_scene_save(scene_, test_file("textures.json").c_str()), QUOIN_OK) << quoin_last_error();
+  quoin_scene again = 0;
+  ASSERT_EQ(quoin_scene_load(test_file("textures.json").c_str(), &again), QUOIN_OK) << quoin_last_error();
+  quoin_textures made = 0;
+  ASSERT_EQ(quoin_scene_textures(again, 0, &made), QUOIN_OK);
+  std::array<quoin_face, 6> read{};
+  read[0] = sized<quoin_face>();
+  std::size_t count = 0;
+  ASSERT_EQ(quoin_textures_faces(made, leaves, read.data(), &count), QUOIN_OK);
+  ASSERT_EQ(count, 6U);
+  EXPECT_EQ(read[5].alpha, QUOIN_FACE_CUTOUT);
+  EXPECT_TRUE(std::equal(half.begin(), half.end(), read[5].rgba));
+  EXPECT_EQ(quoin_free(made), QUOIN_OK);
+  EXPECT_EQ(quoin_free(again), QUOIN_OK);
+}
+
+TEST_F(CTextures, ReportErrorsForInvalidArguments) {
+  const auto refuses = [&](auto&& change) {
+    std::array<quoin_face, 6> wrong = faces_;
+    change(wrong[3]);
+    return quoin_type_set_faces(scene_, 1, wrong.data()) == QUOIN_INVALID_ARGUMENT;
+  };
+  EXPECT_TRUE(refuses([](quoin_face& face) { face.size = 0; }));
+  EXPECT_TRUE(refuses([](quoin_face& face) { face.rgba = nullptr; }));
+  for (const int size : {0, -16, 8, 17, 48, 2048}) EXPECT_TRUE(refuses([&](quoin_face& face) { face.texels = size; }));
+  EXPECT_TRUE(refuses([](quoin_face& face) { face.turn = 4; }));
+  EXPECT_TRUE(refuses([](quoin_face& face) { face.turn = -1; }));
+  EXPECT_TRUE(refuses([](quoin_face& face) { face.alpha = 3; }));
+  EXPECT_EQ(quoin_type_set_faces(scene_, 0, faces_.data()), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_type_set_faces(scene_, 3, faces_.data()), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_scene_textures(scene_, 0, nullptr), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_type_set_faces(0, 1, nullptr), QUOIN_BAD_HANDLE);
+  // Nothing has changed, and a scene is not a set of textures.
+  const quoin_textures made = textures();
+  std::size_t count = 5;
+  ASSERT_EQ(quoin_textures_array_count(made, &count), QUOIN_OK);
+  EXPECT_EQ(count, 0U);
+  EXPECT_EQ(quoin_textures_array_count(made, nullptr), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_textures_array_count(scene_, &count), QUOIN_BAD_HANDLE);
+  EXPECT_EQ(quoin_textures_faces(made, 1, nullptr, &count), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_textures_faces(made, 1, faces_.data(), nullptr), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_textures_faces(made, 3, faces_.data(), &count), QUOIN_INVALID_ARGUMENT);
+  auto options = sized<quoin_mesh_options>();
+  options.textures = scene_;
+  quoin_mesh mesh = 0;
+  EXPECT_EQ(quoin_grid_mesh(scene_, 0, &options, &mesh), QUOIN_BAD_HANDLE);
+  EXPECT_EQ(quoin_free(made), QUOIN_OK);
+}
+
 TEST(C, ReportsErrorsForInvalidArguments) {
   std::vector<std::uint16_t> voxels;
   const quoin_scene scene = made_scene(voxels);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -64,6 +65,10 @@ struct GridMesh {
   std::vector<float> occlusion;
   std::vector<VoxelType> types;  // empty for smooth meshes
   std::vector<std::uint32_t> indices;
+  // Empty without textures:
+  std::vector<std::uint32_t> textures;
+  std::vector<std::array<float, 2>> texture_uvs;
+  std::vector<Rgba8> tints;
 };
 struct LabelMesh {
   LabelSurfaces surfaces;
@@ -71,11 +76,18 @@ struct LabelMesh {
 };
 using MeshBody = std::variant<GridMesh, ArraySurface, LabelMesh>;
 
+/// The textures of a scene's types when they were numbered. Never changes.
+struct TexturesBody {
+  VoxelRegistry types;
+  TextureSet set;
+};
+
 /// Maps handles to objects. Handles are never reused, so freed ones are detected. find() returns shared ownership: the
 /// object stays alive while in use, even if another thread frees its handle.
 class Handles {
  public:
-  using Thing = std::variant<std::shared_ptr<SceneBody>, std::shared_ptr<MeshBody>>;
+  using Thing =
+      std::variant<std::shared_ptr<SceneBody>, std::shared_ptr<MeshBody>, std::shared_ptr<const TexturesBody>>;
 
   std::uint64_t put(Thing thing) {
     const std::lock_guard lock(mutex_);

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <span>
 
+#include <quoin/mesh/vertex_writer.h>
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render/path_tracer.h>
 #include <quoin/scene/scene_meshes.h>
@@ -90,7 +91,36 @@ std::vector<Rgba8> palette_of(const VoxelRegistry& types) {
   return palette;
 }
 
-Result<GridMesh> put_together(const SceneMeshes& meshes) {
+// Writes an attribute of a blocky surface's vertices.
+template <class Value>
+void write_attribute(VertexAttribute attribute, VertexFormat format, const MeshView& view, const SceneMeshes& meshes,
+                     const TextureSet& textures, std::span<Value> out) {
+  const VertexWriter writer({sizeof(Value), {{attribute, format, 0}}}, meshes.types, textures);
+  writer.write(view, Vec3(0.0F), std::as_writable_bytes(out));
+}
+
+// Adds the textures of a surface's vertices, which are the mesh's from `at` on.
+void add_textures(const MeshView& view, std::size_t at, const SceneMeshes& meshes, const TextureSet& textures,
+                  GridMesh& mesh) {
+  const std::size_t count = view.positions.size();
+  if (view.has_albedo()) {
+    std::copy_n(mesh.colours.begin() + static_cast<std::ptrdiff_t>(at), count,
+                mesh.tints.begin() + static_cast<std::ptrdiff_t>(at));
+    return;
+  }
+  const std::span numbers = std::span(mesh.textures).subspan(at, count);
+  const std::span uvs = std::span(mesh.texture_uvs).subspan(at, count);
+  const std::span tints = std::span(mesh.tints).subspan(at, count);
+  write_attribute(VertexAttribute::Texture, VertexFormat::Uint32, view, meshes, textures, numbers);
+  write_attribute(VertexAttribute::TextureUv, VertexFormat::Float32x2, view, meshes, textures, uvs);
+  write_attribute(VertexAttribute::Tint, VertexFormat::Unorm8x4Srgb, view, meshes, textures, tints);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (numbers[i] == QUOIN_NO_TEXTURE) tints[i] = mesh.colours[at + i];  // opaque, if its type is
+  }
+}
+
+// `textures`: null for surfaces without textures.
+Result<GridMesh> put_together(const SceneMeshes& meshes, const TextureSet* textures) {
   std::size_t vertices = 0;
   std::size_t indices = 0;
   for (const MeshPart& part : meshes.parts) {
@@ -107,6 +137,11 @@ Result<GridMesh> put_together(const SceneMeshes& meshes) {
   mesh.normals.resize(vertices);
   mesh.colours.resize(vertices);
   mesh.occlusion.resize(vertices);
+  if (textures != nullptr) {
+    mesh.textures.assign(vertices, QUOIN_NO_TEXTURE);
+    mesh.texture_uvs.resize(vertices);
+    mesh.tints.resize(vertices);
+  }
   const std::vector<Rgba8> palette = palette_of(meshes.types);
   std::uint32_t* next = mesh.indices.data();
   for (const MeshPart& part : meshes.parts) {
@@ -119,13 +154,16 @@ Result<GridMesh> put_together(const SceneMeshes& meshes) {
         add_smooth_vertices(view, at, mesh);
       else
         add_block_vertices(view, at, palette, mesh);
+      if (textures != nullptr) add_textures(view, at, meshes, *textures, mesh);
     }
   }
   if (!mesh.types.empty()) mesh.types.resize(vertices, kAir);
   return mesh;
 }
 
-Result<GridMesh> mesh_of(const Scene& from, GridHandle handle, const quoin_mesh_options& options) {
+// `textures`: null: the set of the scene's textures.
+Result<GridMesh> mesh_of(const Scene& from, GridHandle handle, const quoin_mesh_options& options,
+                         const TexturesBody* textures) {
   Scene alone;
   alone.types = from.types;
   SceneGrid grid;
@@ -141,7 +179,11 @@ Result<GridMesh> mesh_of(const Scene& from, GridHandle handle, const quoin_mesh_
   const auto meshes = options.smooth != 0 ? mesh_scene_smoothly(alone, {}, threads, progress())
                                           : mesh_scene(alone, blocks, threads, progress());
   if (!meshes) return meshes.error();
-  return put_together(*meshes);
+  if (options.smooth != 0 || !alone.types.has_textures()) return put_together(*meshes, nullptr);
+  if (textures != nullptr) return put_together(*meshes, &textures->set);
+  TextureSet own;
+  own.add(alone.types);
+  return put_together(*meshes, &own);
 }
 
 template <class Mesh>
@@ -158,6 +200,11 @@ void show(const GridMesh& mesh, quoin_mesh_data& data) {
   data.colours = reinterpret_cast<const std::uint8_t*>(mesh.colours.data());
   data.occlusion = mesh.occlusion.data();
   data.types = mesh.types.empty() ? nullptr : mesh.types.data();
+  if (!mesh.textures.empty()) {
+    data.textures = mesh.textures.data();
+    data.texture_uvs = mesh.texture_uvs.front().data();
+    data.tints = reinterpret_cast<const std::uint8_t*>(mesh.tints.data());
+  }
   data.indices = mesh.indices.data();
 }
 void show(const ArraySurface& mesh, quoin_mesh_data& data) {
@@ -292,7 +339,12 @@ quoin_status quoin_grid_mesh(quoin_scene scene, std::size_t grid, const quoin_me
     const auto given = taken_or_default(options);
     if (!given) return fail(QUOIN_INVALID_ARGUMENT, "the size of the options");
     if (grid >= body.numbers.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
-    auto mesh = mesh_of(body.loaded.scene, body.numbers.grids[grid], *given);
+    std::shared_ptr<const TexturesBody> textures;
+    if (given->textures != 0) {
+      textures = handles().find<const TexturesBody>(given->textures);
+      if (textures == nullptr) return fail(QUOIN_BAD_HANDLE, "no textures have this handle");
+    }
+    auto mesh = mesh_of(body.loaded.scene, body.numbers.grids[grid], *given, textures.get());
     return mesh ? give(std::move(*mesh), out) : fail(mesh.error());
   });
 }

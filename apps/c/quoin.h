@@ -2,9 +2,9 @@
  *
  * Status:   every function that can fail returns QUOIN_OK or an error code. After an error, quoin_last_error() returns
  *           the reason in one line. No call ends the process or throws an exception.
- * Handles:  scenes and meshes are numbers, never 0. A freed or unknown handle gives QUOIN_BAD_HANDLE.
- * Arrays:   the caller owns its input and output arrays. Arrays from quoin_mesh_view belong to the mesh and are valid
- *           until it is freed.
+ * Handles:  scenes, meshes and textures are numbers, never 0. A freed or unknown handle gives QUOIN_BAD_HANDLE.
+ * Arrays:   the caller owns its input and output arrays. Arrays from quoin_mesh_view and quoin_textures_faces belong to
+ *           the mesh or the textures, and are valid until these are freed.
  * Structs:  set `size` to sizeof the struct (QUOIN_INIT does). Later versions add fields at the end; programs compiled
  *           with an older header, whose structs are shorter, keep working.
  * Axes:     right-handed, +Y up. Voxel (x, y, z) is the cube from (x, y, z) to (x + 1, y + 1, z + 1).
@@ -62,6 +62,7 @@ typedef enum quoin_scalar {
 
 typedef uint64_t quoin_scene;
 typedef uint64_t quoin_mesh;
+typedef uint64_t quoin_textures;
 
 /* A dense array of numbers; axes 0, 1 and 2 are x, y and z. */
 typedef struct quoin_array {
@@ -103,6 +104,38 @@ typedef struct quoin_type {
   int32_t blocks_light;
   int32_t occludes;
 } quoin_type;
+
+enum {
+  QUOIN_FACE_OPAQUE = 0,     /* the texture has no transparent texels */
+  QUOIN_FACE_CUTOUT = 1,     /* texels with an alpha of at least 128 are visible, others are not: leaves, fences */
+  QUOIN_FACE_TRANSLUCENT = 2 /* alpha blends the face with the background: stained glass */
+};
+/* The number of a texture that quoin_face and quoin_mesh_data do not have. */
+#define QUOIN_NO_TEXTURE 0xFFFFFFFFu
+
+/* One face of a type: a texture that covers the face of a voxel once. Turn 0 shows the texture to a viewer outside like
+ * this: on the four sides, its top is at +Y; on +Y its right is at +Z and its top at +X; on -Y its right is at +X and
+ * its top at +Z. */
+typedef struct quoin_face {
+  size_t size;
+  char name[128];      /* of the texture; UTF-8, truncated if longer */
+  const uint8_t* rgba; /* [texels][texels][4]: rows from the top, sRGB with linear alpha, not premultiplied */
+  int32_t texels;      /* per side of the texture: 16, 32, 64, 128, 256, 512 or 1,024 */
+  int32_t turn;        /* clockwise quarter turns for a viewer outside, 0 to 3 */
+  int32_t mirrored;    /* 1: exchanges left and right, before the turn */
+  int32_t alpha;       /* QUOIN_FACE_... */
+  int32_t has_tint;    /* 0: white */
+  uint8_t tint[4];     /* sRGB; multiplies the texture in linear light. The fourth number has no effect */
+  uint32_t texture;    /* output of quoin_textures_faces: the number of its texture, layer + 65,536 * array */
+} quoin_face;
+
+/* Textures of one size, for a device's texture array. */
+typedef struct quoin_texture_array {
+  size_t size;
+  int32_t texels; /* per side */
+  int32_t levels; /* of mipmaps, down to one texel: 5 for 16 texels */
+  size_t layers;
+} quoin_texture_array;
 
 /* One placement of a grid in the world. */
 typedef struct quoin_instance {
@@ -190,6 +223,10 @@ typedef struct quoin_mesh_data {
   /* [vertex_count], for grids meshed as blocks. Blocks come first, with four vertices and six indices per face
    * (watertight: possibly more). The surfaces of fields follow, with type 0. */
   const uint16_t* types;
+  /* For grids meshed as blocks, if any type of the scene has faces. A face shows tint times texture. */
+  const uint32_t* textures; /* [vertex_count]: numbers as in quoin_face; QUOIN_NO_TEXTURE: the tint is the colour */
+  const float* texture_uvs; /* [vertex_count][2]: rightwards and downwards, 1 per voxel; the texture repeats */
+  const uint8_t* tints;     /* [vertex_count][4], sRGB */
 } quoin_mesh_data;
 
 typedef struct quoin_mesh_options {
@@ -201,6 +238,8 @@ typedef struct quoin_mesh_options {
   /* Blocks only: keeps face corners off the inside of other faces' edges. This avoids visible gaps but makes more
    * triangles. Smooth surfaces are always watertight. */
   int32_t watertight;
+  /* Numbers the textures of faces; 0: as quoin_scene_textures with a limit of 0 numbers those of the scene. */
+  quoin_textures textures;
 } quoin_mesh_options;
 
 /* The encoding of heights in an image. */
@@ -304,7 +343,7 @@ QUOIN_API const char* quoin_version(void);
 QUOIN_API const char* quoin_last_error(void);
 /* Sets the progress callback for later calls of this thread; null removes it. `user` is passed to the callback. */
 QUOIN_API quoin_status quoin_set_progress(quoin_progress progress, void* user);
-/* Frees a scene or a mesh; ignores 0. */
+/* Frees a scene, a mesh or textures; ignores 0. */
 QUOIN_API quoin_status quoin_free(uint64_t handle);
 
 /* Scenes. `path` is UTF-8. */
@@ -330,6 +369,26 @@ QUOIN_API quoin_status quoin_scene_warning(quoin_scene scene, size_t index, char
 QUOIN_API quoin_status quoin_type_count(quoin_scene scene, size_t* out);
 QUOIN_API quoin_status quoin_type_get(quoin_scene scene, size_t index, quoin_type* out);
 QUOIN_API quoin_status quoin_type_add(quoin_scene scene, const quoin_type* type, uint16_t* out);
+
+/* Sets the textures of a type: six faces, in the order +X, -X, +Y, -Y, +Z, -Z. `size` is set in each element. Copies
+ * the texels. The type's colour becomes the mean of its faces. An opaque type has opaque faces; cutout and translucent
+ * faces need a transparent type. Null removes the textures, and the type keeps its colour. */
+QUOIN_API quoin_status quoin_type_set_faces(quoin_scene scene, size_t type, const quoin_face* faces);
+
+/* Numbers the textures of all types, each once, as layers of arrays: one array per size, and more if a size has more
+ * textures than `max_layers`, the limit of a device (0: 2,048). Later changes of the scene do not affect the result.
+ * Adding types keeps the numbers of the textures before them. */
+QUOIN_API quoin_status quoin_scene_textures(quoin_scene scene, size_t max_layers, quoin_textures* out);
+QUOIN_API quoin_status quoin_textures_array_count(quoin_textures textures, size_t* out);
+QUOIN_API quoin_status quoin_textures_array_get(quoin_textures textures, size_t index, quoin_texture_array* out);
+/* Copies a mipmap level of all layers of an array, one layer after another: rgba[layers][n][n][4], where n is
+ * texels >> level. Fails if that is more than `capacity` bytes. Mipmaps are means in linear light, weighted by
+ * alpha. */
+QUOIN_API quoin_status quoin_textures_read(quoin_textures textures, size_t array, int32_t level, uint8_t* rgba,
+                                           size_t capacity);
+/* Gets the six faces of a type, and their number, 6, or 0 for a type without textures. Set the size of the first
+ * element of `out`: it is the size of each. */
+QUOIN_API quoin_status quoin_textures_faces(quoin_textures textures, size_t type, quoin_face* out, size_t* count);
 
 /* Grids, by number. */
 QUOIN_API quoin_status quoin_grid_count(quoin_scene scene, size_t* out);

@@ -1,6 +1,7 @@
 // Scenes, their types and their grids.
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -198,6 +199,72 @@ const char* validate_load_options(const quoin_load_options& options) {
   return validate_heights(options);
 }
 
+const char* validate_face(const quoin_face& face) {
+  if (face.rgba == nullptr) return "the texels of a face are null";
+  if (face.texels < kMinTextureSize || face.texels > kMaxTextureSize || !std::has_single_bit(unsigned(face.texels)))
+    return "the texels per side of a face must be 16, 32, 64, 128, 256, 512 or 1024";
+  if (face.turn < 0 || face.turn > 3) return "the turn of a face must be 0 to 3";
+  if (face.alpha < QUOIN_FACE_OPAQUE || face.alpha > QUOIN_FACE_TRANSLUCENT)
+    return "the alpha of a face is not a QUOIN_FACE value";
+  return nullptr;
+}
+
+Result<VoxelFace> face_of(const quoin_face& given) {
+  if (const char* wrong = validate_face(given)) return make_error(ErrorCode::InvalidArgument, wrong);
+  const std::size_t bytes = std::size_t{4} * given.texels * given.texels;
+  auto texture =
+      Texture::from_image(text_in(given.name), {given.texels, given.texels, {given.rgba, given.rgba + bytes}});
+  if (!texture) return texture.error();
+  VoxelFace face{std::move(*texture)};
+  face.turn = static_cast<std::uint8_t>(given.turn);
+  face.mirrored = given.mirrored != 0;
+  face.alpha = static_cast<FaceAlpha>(given.alpha);
+  if (given.has_tint != 0) face.tint = {given.tint[0], given.tint[1], given.tint[2], 255};
+  return face;
+}
+
+// Reads six faces. The `size` of each one gives the position of the next.
+Result<VoxelFaces> faces_of(const quoin_face* faces) {
+  std::array<VoxelFace, 6> made;
+  const auto* at = reinterpret_cast<const std::byte*>(faces);
+  for (VoxelFace& each : made) {
+    const auto given = taken(reinterpret_cast<const quoin_face*>(at));
+    if (!given) return make_error(ErrorCode::InvalidArgument, "invalid size of a face");
+    auto face = face_of(*given);
+    if (!face) return face.error();
+    each = std::move(*face);
+    at += given->size;
+  }
+  return VoxelFaces(made);
+}
+
+quoin_face described(const VoxelFace& face, const TextureSet& set) {
+  quoin_face made{};
+  copy_text(face.texture.name(), made.name);
+  made.rgba = reinterpret_cast<const std::uint8_t*>(face.texture.level(0).data());
+  made.texels = face.texture.size();
+  made.turn = face.turn;
+  made.mirrored = face.mirrored ? 1 : 0;
+  made.alpha = static_cast<std::int32_t>(face.alpha);
+  made.has_tint = face.tint.r == 255 && face.tint.g == 255 && face.tint.b == 255 ? 0 : 1;
+  const std::uint8_t tint[] = {face.tint.r, face.tint.g, face.tint.b, 255};
+  std::memcpy(made.tint, tint, sizeof tint);
+  const auto layer = set.find(face.texture);
+  const bool is_numbered = layer && layer->array <= 0xFFFFU && layer->layer <= 0xFFFFU;
+  made.texture = is_numbered ? layer->array << 16U | layer->layer : QUOIN_NO_TEXTURE;
+  return made;
+}
+
+// Runs `work` with textures, which never change.
+template <class Work>
+quoin_status with_textures(quoin_textures handle, Work&& work) noexcept {
+  return guarded([&] {
+    const auto textures = handles().find<const TexturesBody>(handle);
+    if (textures == nullptr) return fail(QUOIN_BAD_HANDLE, "no textures have this handle");
+    return work(*textures);
+  });
+}
+
 // The densities of voxel types that a caller gives; null: 1 for all.
 struct Densities {
   const double* of_type;
@@ -355,8 +422,9 @@ const char* quoin_last_error(void) {
 
 quoin_status quoin_free(std::uint64_t handle) {
   return guarded([&] {
-    return handle == 0 || handles().remove(handle) ? QUOIN_OK
-                                                   : fail(QUOIN_BAD_HANDLE, "no scene or mesh has this handle");
+    return handle == 0 || handles().remove(handle)
+               ? QUOIN_OK
+               : fail(QUOIN_BAD_HANDLE, "no scene, mesh or textures have this handle");
   });
 }
 
@@ -457,6 +525,90 @@ quoin_status quoin_type_add(quoin_scene scene, const quoin_type* type, std::uint
     const auto added = body.loaded.scene.types.add(properties_of(*given));
     if (!added) return fail(added.error());
     *out = *added;
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_type_set_faces(quoin_scene scene, std::size_t type, const quoin_face* faces) {
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
+    VoxelRegistry& types = body.loaded.scene.types;
+    if (type == kAir || type >= types.size()) return fail(QUOIN_INVALID_ARGUMENT, "no type has this number");
+    const auto number = static_cast<VoxelType>(type);
+    VoxelProperties changed = types[number];
+    changed.faces = {};
+    if (faces != nullptr) {
+      auto given = faces_of(faces);
+      if (!given) return fail(given.error());
+      changed.faces = std::move(*given);
+    }
+    if (Status valid = quoin::validate_type(changed); !valid) return fail(valid.error());
+    types.replace(number, std::move(changed));
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_scene_textures(quoin_scene scene, std::size_t max_layers, quoin_textures* out) {
+  return with_scene(scene, Use::Read, [&](SceneBody& body) {
+    if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
+    TexturesBody made{body.loaded.scene.types, max_layers == 0 ? TextureSet() : TextureSet(max_layers)};
+    made.set.add(made.types);
+    *out = handles().put(std::make_shared<const TexturesBody>(std::move(made)));
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_textures_array_count(quoin_textures textures, std::size_t* out) {
+  return with_textures(textures, [&](const TexturesBody& body) {
+    if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
+    *out = body.set.arrays().size();
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_textures_array_get(quoin_textures textures, std::size_t index, quoin_texture_array* out) {
+  return with_textures(textures, [&](const TexturesBody& body) {
+    if (index >= body.set.arrays().size()) return fail(QUOIN_INVALID_ARGUMENT, "no array has this number");
+    const TextureSet::Array& found = body.set.arrays()[index];
+    quoin_texture_array array{};
+    array.texels = found.size;
+    array.levels = found.layers.front().level_count();
+    array.layers = found.layers.size();
+    return report(array, out);
+  });
+}
+
+quoin_status quoin_textures_read(quoin_textures textures, std::size_t array, std::int32_t level, std::uint8_t* rgba,
+                                 std::size_t capacity) {
+  return with_textures(textures, [&](const TexturesBody& body) {
+    if (rgba == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "rgba is null");
+    if (array >= body.set.arrays().size()) return fail(QUOIN_INVALID_ARGUMENT, "no array has this number");
+    const std::vector<Texture>& layers = body.set.arrays()[array].layers;
+    if (level < 0 || level >= layers.front().level_count())
+      return fail(QUOIN_INVALID_ARGUMENT, "no mipmap level has this number");
+    const std::size_t bytes = layers.front().level(level).size_bytes();
+    if (capacity / bytes < layers.size())
+      return fail(QUOIN_INVALID_ARGUMENT, "the array is too small for the textures");
+    for (const Texture& layer : layers) {
+      std::memcpy(rgba, layer.level(level).data(), bytes);
+      rgba += bytes;
+    }
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_textures_faces(quoin_textures textures, std::size_t type, quoin_face* out, std::size_t* count) {
+  return with_textures(textures, [&](const TexturesBody& body) {
+    if (count == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "count is null");
+    if (!has_fit_size(out)) return fail(QUOIN_INVALID_ARGUMENT, "out is null, or its size");
+    if (type >= body.types.size()) return fail(QUOIN_INVALID_ARGUMENT, "no type has this number");
+    const VoxelFaces& faces = body.types[static_cast<VoxelType>(type)].faces;
+    *count = faces.empty() ? 0 : 6;
+    const std::size_t size = out->size;
+    for (std::size_t i = 0; i < *count; ++i) {
+      quoin_face whole = described(faces[static_cast<Direction>(i)], body.set);
+      whole.size = size;
+      std::memcpy(reinterpret_cast<std::byte*>(out) + i * size, &whole, size);
+    }
     return QUOIN_OK;
   });
 }
