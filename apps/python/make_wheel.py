@@ -42,7 +42,7 @@ def fill(folder, library, version):
     package = os.path.join(folder, "quoin")
     os.makedirs(licences)
     os.makedirs(os.path.join(package, "libs"))
-    for name in ("__init__.py", "_c.py", "_mesh.py", "_scene.py", "py.typed"):
+    for name in ("__init__.py", "_c.py", "_mesh.py", "_scene.py", "_textures.py", "py.typed"):
         shutil.copyfile(os.path.join(here, "quoin", name), os.path.join(package, name))
     interface = os.path.join(package, "libquoin_c.so.0")
     subprocess.run(["strip", "-o", interface, library], check=True)

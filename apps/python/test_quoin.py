@@ -587,10 +587,70 @@ class Pages(unittest.TestCase):
         self.assertGreaterEqual(len(images), 3)
 
 
+class Textures(unittest.TestCase):
+    def scene(self):
+        random = np.random.default_rng(5)
+        self.stone = random.integers(0, 256, (16, 16, 3), np.uint8)
+        self.glass = random.integers(0, 256, (32, 32, 4), np.uint8)
+        scene = quoin.from_numpy(np.ones((3, 1, 1), np.uint8), [(1, 2, 3), (4, 5, 6, 200)])
+        side = quoin.Face(self.stone, "stone", turn=3, mirrored=True, tint=(255, 128, 0))
+        scene.set_faces(1, (side, side._replace(turn=0), side._replace(image=self.stone[::-1], name="below")))
+        scene.set_faces(2, quoin.Face(self.glass[:, ::-1], alpha="translucent"))
+        return scene
+
+    def test_of_types_are_read_back(self):
+        textures = self.scene().textures()
+        self.assertIsNone(textures.faces(0))
+        sides = textures.faces(1)
+        self.assertEqual([one.turn for one in sides], [3, 3, 0, 3, 3, 3])
+        self.assertEqual([one.name for one in sides], ["stone"] * 3 + ["below"] + ["stone"] * 2)
+        self.assertEqual([one.texture for one in sides], [0, 0, 0, 1, 0, 0])
+        self.assertEqual(sides[4][2:6], (3, True, (255, 128, 0), "opaque"))
+        self.assertTrue((sides[0].image[..., :3] == self.stone).all())
+        self.assertTrue((sides[3].image[..., :3] == self.stone[::-1]).all())
+        self.assertTrue((sides[3].image[..., 3] == 255).all())
+        glass = textures.faces(2)[5]
+        self.assertEqual((glass.texture, glass.alpha, glass.name), (65536, "translucent", ""))
+        del textures
+        gc.collect()
+        self.assertTrue((glass.image == self.glass[:, ::-1]).all(), "the view keeps the texels")
+        with self.assertRaises(ValueError):
+            glass.image[0] = 1
+
+    def test_are_arrays_of_layers(self):
+        textures = self.scene().textures()
+        small, large = textures.arrays
+        self.assertEqual((small.shape, small.dtype, large.shape), ((2, 16, 16, 4), np.uint8, (1, 32, 32, 4)))
+        self.assertTrue((small[1, ..., :3] == self.stone[::-1]).all())
+        self.assertTrue((large[0] == self.glass[:, ::-1]).all())
+        self.assertEqual(textures.level(1, 3).shape, (1, 4, 4, 4))
+        for array, level in ((0, 5), (0, -1), (2, 0)):
+            with self.assertRaises(quoin.QuoinError):
+                textures.level(array, level)
+
+    def test_of_meshes_have_numbers_and_coordinates(self):
+        scene = self.scene()
+        for textures in (None, scene.textures(max_layers=1)):
+            mesh = scene.grids[0].mesh(textures=textures)
+            below = mesh.normals[:, 1] < -0.5
+            self.assertEqual(set(mesh.textures[below]), {1 if textures is None else 65536})
+            self.assertEqual(set(mesh.textures[~below]), {0})
+            self.assertEqual(set(map(tuple, mesh.tints)), {(255, 128, 0, 255)})
+            top = mesh.normals[:, 1] > 0.5  # right is +Z, down is -X; mirrored
+            self.assertTrue((mesh.texture_uvs[top] == -mesh.positions[top][:, [2, 0]]).all())
+        smooth = scene.grids[0].mesh(smooth=True)
+        self.assertIsNone(smooth.textures)
+        scene.set_faces(1, None)
+        scene.set_faces(2, None)
+        self.assertIsNone(scene.grids[0].mesh().textures)
+        self.assertEqual(scene.textures().arrays, [])
+
+
 class BadInput(unittest.TestCase):
     def test_raises_and_never_crashes(self):
         array, nan = np.zeros((4, 4, 4), np.uint8), float("nan")
         scene, full = quoin.Scene(), quoin.from_numpy(array + 1, [(1, 2, 3)])
+        face = quoin.Face(np.zeros((16, 16, 3), np.uint8))
         for wrong, error in [
             (lambda: quoin.surface_nets(array[0], 0.5), ValueError),
             (lambda: quoin.surface_nets(array[:0], 0.5), ValueError),
@@ -680,6 +740,25 @@ class BadInput(unittest.TestCase):
             (lambda: full.place(full.grids[0], np.eye(4), 5), TypeError),
             (lambda: scene.add_type(quoin.VoxelType((1, 2, 3, 4), "a\0b")), ValueError),
             (lambda: scene.add_type((0.5, 0.5, 0.5)), TypeError),
+            (lambda: full.set_faces(1, quoin.Face([[0]])), TypeError),
+            (lambda: full.set_faces(1, [(1, 2, 3)]), TypeError),
+            (lambda: full.set_faces(1, [face, face]), ValueError),
+            (lambda: full.set_faces(1, quoin.Face(np.zeros((16, 17, 3), np.uint8))), ValueError),
+            (lambda: full.set_faces(1, quoin.Face(np.zeros((16, 16, 3)))), ValueError),
+            (lambda: full.set_faces(1, quoin.Face(np.zeros((17, 17, 3), np.uint8))), quoin.QuoinError),
+            (lambda: full.set_faces(1, quoin.Face(np.zeros((0, 0, 3), np.uint8))), quoin.QuoinError),
+            (lambda: full.set_faces(1, face._replace(turn=4)), quoin.QuoinError),
+            (lambda: full.set_faces(1, face._replace(turn=2**32)), ValueError),
+            (lambda: full.set_faces(1, face._replace(alpha="glass")), ValueError),
+            (lambda: full.set_faces(1, face._replace(alpha="cutout")), quoin.QuoinError),
+            (lambda: full.set_faces(1, face._replace(tint=(1, 2))), ValueError),
+            (lambda: full.set_faces(1, face._replace(tint=(1, 2, 256))), ValueError),
+            (lambda: full.set_faces(1, quoin.Face(np.zeros((16, 16, 4), np.uint8))), quoin.QuoinError),
+            (lambda: full.set_faces(0, face), quoin.QuoinError),
+            (lambda: full.set_faces(9, None), quoin.QuoinError),
+            (lambda: full.textures(-1), ValueError),
+            (lambda: full.textures().level(0), quoin.QuoinError),
+            (lambda: full.textures().faces(9), quoin.QuoinError),
             (lambda: full.save("a\0b.vox"), ValueError),
             (lambda: quoin.load("a\0b.vox"), ValueError),
             (lambda: quoin.load("a.vox", frame=2**32), ValueError),
@@ -726,7 +805,7 @@ class Package(unittest.TestCase):
 
 def load_tests(loader, tests, pattern):
     names = {**vars(quoin), "np": np}
-    for module in (quoin, quoin._mesh, quoin._scene):
+    for module in (quoin, quoin._mesh, quoin._scene, quoin._textures):
         suite = doctest.DocTestSuite(module, extraglobs=names)
         assert suite.countTestCases() > 1, "a module without examples"
         tests.addTests(suite)

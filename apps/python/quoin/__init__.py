@@ -36,10 +36,12 @@ from ._c import NdArray, QuoinError, Status
 from ._mesh import Mesh, mesh_labels, surface_nets
 from ._scene import (Body, Camera, Environment, Fog, Format, Grid, Ground, Group, Heights, Hits, Instance, Lamp, Layer,
                      Raw, Scene, Sun, VoxelType, formats, from_numpy, load, load_bytes)
+from ._textures import Face, Textures
 
-__all__ = ["Body", "Camera", "Environment", "Fog", "Format", "Grid", "Ground", "Group", "Heights", "Hits", "Instance",
-           "Lamp", "Layer", "Mesh", "QuoinError", "Raw", "Scene", "Status", "Sun", "VoxelType", "__version__",
-           "formats", "from_numpy", "load", "load_bytes", "mesh_labels", "png", "progress", "surface_nets", "version"]
+__all__ = ["Body", "Camera", "Environment", "Face", "Fog", "Format", "Grid", "Ground", "Group", "Heights", "Hits",
+           "Instance", "Lamp", "Layer", "Mesh", "QuoinError", "Raw", "Scene", "Status", "Sun", "Textures", "VoxelType",
+           "__version__", "formats", "from_numpy", "load", "load_bytes", "mesh_labels", "png", "progress",
+           "surface_nets", "version"]
 
 
 def __dir__() -> List[str]:

@@ -73,6 +73,21 @@ class Type(ctypes.Structure):
                 ("occludes", ctypes.c_int32)]
 
 
+NO_TEXTURE = 0xFFFFFFFF
+
+
+class Face(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("name", ctypes.c_char * 128), ("rgba", ctypes.c_void_p),
+                ("texels", ctypes.c_int32), ("turn", ctypes.c_int32), ("mirrored", ctypes.c_int32),
+                ("alpha", ctypes.c_int32), ("has_tint", ctypes.c_int32), ("tint", ctypes.c_uint8 * 4),
+                ("texture", ctypes.c_uint32)]
+
+
+class TextureArray(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("texels", ctypes.c_int32), ("levels", ctypes.c_int32),
+                ("layers", ctypes.c_size_t)]
+
+
 class Instance(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("name", ctypes.c_char * 128), ("grid", ctypes.c_size_t),
                 ("world_from_grid", ctypes.c_double * 12), ("visible", ctypes.c_int32), ("shown", ctypes.c_int32),
@@ -138,12 +153,14 @@ class MeshData(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("vertex_count", ctypes.c_size_t), ("index_count", ctypes.c_size_t),
                 ("interface_count", ctypes.c_size_t), ("positions", ctypes.c_void_p), ("normals", ctypes.c_void_p),
                 ("colours", ctypes.c_void_p), ("occlusion", ctypes.c_void_p), ("indices", ctypes.c_void_p),
-                ("interfaces", ctypes.c_void_p), ("types", ctypes.c_void_p)]
+                ("interfaces", ctypes.c_void_p), ("types", ctypes.c_void_p), ("textures", ctypes.c_void_p),
+                ("texture_uvs", ctypes.c_void_p), ("tints", ctypes.c_void_p)]
 
 
 class MeshOptions(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("smooth", ctypes.c_int32), ("no_occlusion", ctypes.c_int32),
-                ("threads", ctypes.c_int32), ("reserved", ctypes.c_int32), ("watertight", ctypes.c_int32)]
+                ("threads", ctypes.c_int32), ("reserved", ctypes.c_int32), ("watertight", ctypes.c_int32),
+                ("textures", ctypes.c_uint64)]
 
 
 class RenderOptions(ctypes.Structure):
@@ -203,6 +220,12 @@ _SIGNATURES = {
     "quoin_type_count": (_handle, _p),
     "quoin_type_get": (_handle, _n, _p),
     "quoin_type_add": (_handle, _p, _p),
+    "quoin_type_set_faces": (_handle, _n, _p),
+    "quoin_scene_textures": (_handle, _n, _p),
+    "quoin_textures_array_count": (_handle, _p),
+    "quoin_textures_array_get": (_handle, _n, _p),
+    "quoin_textures_read": (_handle, _n, _i, _p, _n),
+    "quoin_textures_faces": (_handle, _n, _p, _p),
     "quoin_grid_count": (_handle, _p),
     "quoin_grid_get_info": (_handle, _n, _p),
     "quoin_grid_read": (_handle, _n, _p, _p, _p, _n),
@@ -304,7 +327,7 @@ class Owner:
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         # A copy would free the handle twice; in another process the handle is invalid.
-        raise TypeError("cannot copy or pickle scenes, grids and meshes: save the scene, or copy the arrays")
+        raise TypeError("cannot copy or pickle scenes, grids, meshes and textures: save the scene, or copy the arrays")
 
     def __del__(self) -> None:
         if self.handle:

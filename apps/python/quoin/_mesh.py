@@ -29,6 +29,11 @@ class Mesh:
     colours: Optional[NdArray]  #: uint8, (vertices, 4), sRGB without occlusion; only for grids
     occlusion: Optional[NdArray]  #: float32, (vertices,), 0 open to 1 dark; only for grids
     types: Optional[NdArray]  #: uint16, (vertices,), voxel types; only for blocks; 0: a field's surface
+    #: uint32, (vertices,), numbers in `Textures`, 2**32 - 1: none; only for blocks of scenes with textures
+    textures: Optional[NdArray]
+    #: float32, (vertices, 2), with `textures`: rightwards and downwards, 1 per voxel; the texture repeats
+    texture_uvs: Optional[NdArray]
+    tints: Optional[NdArray]  #: uint8, (vertices, 4), with `textures`: sRGB, multiplies the texture in linear light
     interfaces: Optional[NdArray]  #: int64, (n, 4); only for labels; see `mesh_labels`
 
     def __init__(self, owner: _c.Owner) -> None:
@@ -49,6 +54,9 @@ class Mesh:
         self.colours = view(data.colours, (n, 4), np.uint8)
         self.occlusion = view(data.occlusion, (n,), np.float32)
         self.types = view(data.types, (n,), np.uint16)
+        self.textures = view(data.textures, (n,), np.uint32)
+        self.texture_uvs = view(data.texture_uvs, (n, 2), np.float32)
+        self.tints = view(data.tints, (n, 4), np.uint8)
         self.interfaces = view(data.interfaces, (data.interface_count, 4), np.int64)
 
     def __repr__(self) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from . import _c
 from ._c import NdArray
 from ._mesh import Mesh
+from ._textures import Face, Textures, faces_struct
 
 Path = Union[str, "os.PathLike[str]"]
 Colour = Sequence[int]
@@ -360,7 +361,8 @@ class Grid:
                 return [_body_of(one) for one in room[:found.value]]
             room = (_c.Body * found.value)(_c.sized(_c.Body))  # again if another thread adds pieces
 
-    def mesh(self, smooth: bool = False, occlusion: bool = True, threads: int = 0, watertight: bool = False) -> Mesh:
+    def mesh(self, smooth: bool = False, occlusion: bool = True, threads: int = 0, watertight: bool = False,
+             textures: Optional[Textures] = None) -> Mesh:
         """Meshes the grid as blocks with merged faces, or as a smooth surface. Positions are in the grid's voxels.
 
         Equal neighbouring block faces are merged to quads, which can cover many voxel faces. A quad has two triangles
@@ -368,11 +370,14 @@ class Grid:
 
         `smooth`: makes a smooth surface. `occlusion`: computes `Mesh.occlusion` of blocks. `watertight`: adds a vertex
         where an edge of a quad meets a corner of another quad. This avoids visible gaps, but quads may then have more
-        than four vertices. Smooth surfaces are always watertight.
+        than four vertices. Smooth surfaces are always watertight. `textures`: numbers `Mesh.textures`; default: as
+        `Scene.textures` does now.
         """
         options = _c.sized(_c.MeshOptions)
         options.smooth, options.no_occlusion = int(smooth), int(not occlusion)
         options.watertight = int(watertight)
+        if textures is not None:
+            options.textures = textures._owner.handle
         options.threads = _c.whole(threads, "threads")
         out = ctypes.c_uint64()
         _c.check(_c.lib.quoin_grid_mesh(self._scene._owner.handle, self._number, ctypes.byref(options),
@@ -534,6 +539,31 @@ class Scene:
         out = ctypes.c_uint16()
         _c.check(_c.lib.quoin_type_add(self._owner.handle, ctypes.byref(one), ctypes.byref(out)))
         return out.value
+
+    def set_faces(self, type: int, faces: Union[Face, Sequence[Face], None]) -> None:
+        """Sets the textures of a type: one face for all sides, three (sides, top, bottom), or six in the order +X, -X,
+        +Y, -Y, +Z, -Z. The type's colour becomes their mean. None removes the textures, and the type keeps its colour.
+
+        An image has 16, 32, 64, 128, 256, 512 or 1,024 texels per side. Opaque faces have no transparent texels; cutout
+        and translucent faces need a transparent type. Raises TypeError or ValueError for arrays and numbers that do not
+        fit, and QuoinError for other errors; then nothing changes.
+
+        >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0)])
+        >>> grass, earth = np.full((16, 16, 3), 140, np.uint8), np.full((16, 16, 3), 60, np.uint8)
+        >>> scene.set_faces(1, [Face(earth, "earth"), Face(grass, "grass", tint=(110, 200, 80)), Face(earth, "earth")])
+        >>> faces = scene.textures().faces(1)
+        >>> faces[2].name, faces[2].image.shape, faces[2].tint
+        ('grass', (16, 16, 4), (110, 200, 80))
+        """
+        given = None if faces is None else faces_struct(faces)
+        _c.check(_c.lib.quoin_type_set_faces(self._owner.handle, _c.size(type, "type"), given))
+
+    def textures(self, max_layers: int = 0) -> Textures:
+        """Numbers the textures of all types, each once, as layers of arrays for a device. `max_layers`: the device's
+        limit per array; 0 means 2,048. Adding types keeps the numbers of the textures before them."""
+        out = ctypes.c_uint64()
+        _c.check(_c.lib.quoin_scene_textures(self._owner.handle, _c.size(max_layers, "max_layers"), ctypes.byref(out)))
+        return Textures(_c.Owner(out.value))
 
     def add(self, array: NdArray, origin: Sequence[float] = (0, 0, 0), name: str = "") -> Grid:
         """Adds a grid and places it at `origin`, rounded down to whole voxels. Returns the grid.
