@@ -91,25 +91,28 @@ TEST_F(ToolMesh, ClosesMeshesForPrinting) {
   EXPECT_EQ(run("convert tiny.vox a.stl").status, 0);
 }
 
-TEST_F(ToolMesh, NamesTexturesThatAreLeftOut) {
+TEST_F(ToolMesh, WritesOrNamesTexturesOfTypes) {
   const AlphaImage image{16, 16, std::vector<std::uint8_t>(std::size_t{4} * 16 * 16, 255)};
   Scene scene;
   const VoxelType snow = scene.types.add({.name = "snow", .faces = Texture::from_image("snow", image).value()}).value();
   SceneGrid grid;
-  grid.grid.set({0, 0, 0}, snow);
+  grid.grid.fill_box({{0, 0, 0}, {3, 1, 1}}, snow);
   scene.add_instance({.grid = scene.add_grid(std::move(grid))});
   ASSERT_TRUE(save_scene(scene, folder_.file("snow.json")));
-  const auto warnings = [&](const std::string& rest) {
+  const auto report = [&](const std::string& rest) {
     const ToolRun result = run("convert snow.json --json " + rest);
     EXPECT_EQ(result.status, 0) << result.err;
-    return Json::parse(result.out)["warnings"];
+    return Json::parse(result.out);
   };
-  const std::string reason = ", since the atlas holds the colours of blocks";
-  EXPECT_EQ(warnings("a.glb"), Json::array());
-  EXPECT_EQ(warnings("a.obj"), Json::array());
-  EXPECT_EQ(warnings("a.glb --texture atlas"), Json::array({"textures of types left out" + reason + ": 1"}));
-  EXPECT_EQ(warnings("a.obj --texture atlas"), Json::array({"textures of types left out" + reason + ": 1"}));
-  EXPECT_EQ(warnings("a.ply"), Json::array({"textures of types left out: 1"}));
+  EXPECT_EQ(report("a.glb")["warnings"], Json::array());
+  EXPECT_EQ(report("a.obj")["warnings"], Json::array());
+  EXPECT_EQ(report("a.ply")["warnings"], Json::array({"textures of types left out: 1"}));
+  // In an atlas, faces are not merged.
+  EXPECT_EQ(report("a.glb")["quads"], 6);
+  const Json atlas = report("a.glb --texture atlas");
+  EXPECT_EQ(atlas["quads"], 14);
+  EXPECT_EQ(atlas["warnings"], Json::array());
+  EXPECT_EQ(report("a.obj --texture atlas")["files"], Json({"a.obj", "a.mtl", "a_palette.png", "a_texture_1.png"}));
 }
 
 }  // namespace

@@ -88,8 +88,8 @@ struct FormatDriver {
   Result<std::vector<MeshFile>> (*plan_mesh)(const SceneMeshes& meshes, const std::filesystem::path& path,
                                              const MeshFileOptions& options) = nullptr;
   /// Lists the further files of plan_mesh. Null: none.
-  std::vector<std::filesystem::path> (*mesh_companions)(const SceneMeshes& meshes,
-                                                        const std::filesystem::path& path) = nullptr;
+  std::vector<std::filesystem::path> (*mesh_companions)(const SceneMeshes& meshes, const std::filesystem::path& path,
+                                                        const MeshFileOptions& options) = nullptr;
   /// `most_steps` of file_origin for coordinates in this format; 0: they are always relative to the origin.
   double most_steps = 0.0;
 };

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <numeric>
+#include <span>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -69,6 +69,10 @@ std::uint8_t scaled_in_linear_light(std::uint8_t srgb, double factor) {
   return factor == 1.0 ? srgb : srgb_from_linear(linear_from_srgb(srgb) * factor);
 }
 
+std::uint32_t number_of(Rgba8 tint) {
+  return std::uint32_t{tint.r} << 16U | std::uint32_t{tint.g} << 8U | tint.b;
+}
+
 const char* material_name(SurfaceClass surface) {
   switch (surface) {
     case SurfaceClass::Opaque:
@@ -87,7 +91,9 @@ const char* material_name(SurfaceClass surface) {
 
 MaterialPalette::MaterialPalette(const SceneMeshes& meshes, FaceColours faces)
     : types_(meshes.types),
-      draws_textures_(faces == FaceColours::Textures && meshes.types.has_textures() && meshes.atlas.rgb.empty()) {
+      faces_(faces),
+      draws_textures_(faces != FaceColours::Means && meshes.types.has_textures() && meshes.atlas.rgb.empty()),
+      face_writer_({2 * sizeof(float), {{VertexAttribute::TextureUv, VertexFormat::Float32x2, 0}}}, types_) {
   const auto rows = static_cast<std::uint32_t>((types_.size() + kPaletteWidth - 1) / kPaletteWidth);
   rows_ = std::bit_ceil(std::max(rows, 1U));
   row_height_ = 1.0F / static_cast<float>(rows_);
@@ -109,6 +115,14 @@ MaterialPalette::MaterialPalette(const SceneMeshes& meshes, FaceColours faces)
   find_glass(meshes);
   make_smooth_materials(meshes);
   make_textured_materials();
+  if (has_face_atlas()) fits_ = atlas_.place();
+}
+
+Status MaterialPalette::validate() const {
+  if (fits_) return {};
+  return make_error(ErrorCode::LimitExceeded, "the textures need an atlas larger than " +
+                                                  std::to_string(FaceAtlas::kMaxEdge) +
+                                                  " texels per side; write an image per texture");
 }
 
 const VoxelProperties* MaterialPalette::textured_type(const MeshView& view, std::size_t vertex) const {
@@ -118,20 +132,32 @@ const VoxelProperties* MaterialPalette::textured_type(const MeshView& view, std:
   return type.faces.empty() ? nullptr : &type;
 }
 
+std::size_t MaterialPalette::texture_of(const VoxelFace& face) const {
+  const auto layer = texture_layers_.find(face.texture);
+  QUOIN_ASSERT(layer.has_value(), "a texture that was added");
+  return texture_by_layer_.at({layer->array, layer->layer});
+}
+
+const FaceAtlas::Tile& MaterialPalette::tile_of(const VoxelFace& face) const {
+  const auto found = tile_by_texture_.find({texture_of(face), number_of(face.tint)});
+  QUOIN_ASSERT(found != tile_by_texture_.end(), "a texture in the atlas");
+  return atlas_.tiles()[found->second];
+}
+
 MaterialPalette::TexturedLook MaterialPalette::textured_look(const MeshView& view, std::size_t vertex) const {
   const VoxelProperties* const type = textured_type(view, vertex);
   QUOIN_ASSERT(type != nullptr, "a textured face");
   const VoxelFace& face = type->faces[view.directions[vertex]];
-  const auto layer = texture_layers_.find(face.texture);
-  QUOIN_ASSERT(layer.has_value(), "a texture that was added");
   const auto unit = [](float value, float otherwise) { return value >= 0.0F ? std::min(value, 1.0F) : otherwise; };
   TexturedLook look;
   look.surface = view.surface;
-  look.texture = texture_by_layer_.at({layer->array, layer->layer});
   look.alpha = face.alpha;
-  look.red = face.tint.r;
-  look.green = face.tint.g;
-  look.blue = face.tint.b;
+  if (!has_face_atlas()) {
+    look.texture = texture_of(face);
+    look.red = face.tint.r;
+    look.green = face.tint.g;
+    look.blue = face.tint.b;
+  }
   look.roughness = unit(type->roughness, 1.0F);
   look.metalness = unit(type->metalness, 0.0F);
   look.emission = emits(view.surface) ? clamped_emission(type->emission) : 0.0F;
@@ -145,10 +171,15 @@ void MaterialPalette::add_textures_of(const MeshView& view) {
     const VoxelProperties* const type = textured_type(view, i);
     if (type == nullptr || std::pair(view.types[i], view.directions[i]) == last) continue;
     last = {view.types[i], view.directions[i]};
-    const Texture& texture = type->faces[view.directions[i]].texture;
+    const VoxelFace& face = type->faces[view.directions[i]];
+    const Texture& texture = face.texture;
     const TextureLayer layer = texture_layers_.add(texture);
     if (texture_by_layer_.try_emplace({layer.array, layer.layer}, textures_.size()).second) {
       textures_.push_back(texture);
+    }
+    const std::pair tile(texture_of(face), number_of(face.tint));
+    if (has_face_atlas() && tile_by_texture_.try_emplace(tile, atlas_.tiles().size()).second) {
+      atlas_.add(texture, face.tint);
     }
     textured_by_look_.try_emplace(textured_look(view, i));
   }
@@ -162,7 +193,7 @@ void MaterialPalette::make_textured_materials() {
   for (auto& [look, number] : textured_by_look_) {
     number = textured_materials_.size();
     SurfaceMaterial& material = textured_materials_.emplace_back();
-    material.name = names.add(textures_[look.texture].name(), " ");
+    material.name = names.add(face_image_name(look.texture), " ");
     material.surface = look.surface;
     material.emission = look.emission;
     material.roughness = look.roughness;
@@ -386,56 +417,137 @@ PngImage MaterialPalette::emissive() const {
   return image;
 }
 
+std::vector<std::array<float, 2>> MaterialPalette::face_coordinates(const MeshView& view) const {
+  QUOIN_ASSERT(view.positions.empty() || textured_type(view, 0) != nullptr, "textured faces");
+  std::vector<std::array<float, 2>> coordinates(view.positions.size());
+  face_writer_.write(view, Vec3(0.0F), std::as_writable_bytes(std::span(coordinates)));
+  if (has_face_atlas()) move_into_atlas(view, coordinates);
+  return coordinates;
+}
+
+void MaterialPalette::move_into_atlas(const MeshView& view, std::vector<std::array<float, 2>>& coordinates) const {
+  const Vec3 texel(1.0F / static_cast<float>(atlas_.width()), 1.0F / static_cast<float>(atlas_.height()), 0.0F);
+  // Most vertices have the face of the one before.
+  const FaceAtlas::Tile* tile = nullptr;
+  Vec3 first(0.0F);  // the coordinates at the lowest corner of the voxel's face
+  for (std::size_t i = 0; i < coordinates.size(); ++i) {
+    const Direction direction = view.directions[i];
+    if (i == 0 || view.types[i] != view.types[i - 1] || direction != view.directions[i - 1]) {
+      const VoxelFace& face = types_[view.types[i]].faces[direction];
+      const TextureFrame frame = texture_frame(face, direction);
+      const auto is_negative = [](const IVec3& axis) { return axis.x + axis.y + axis.z < 0; };
+      first = {is_negative(frame.right) ? 1.0F : 0.0F, is_negative(frame.down) ? 1.0F : 0.0F, 0.0F};
+      tile = &tile_of(face);
+    }
+    const auto size = static_cast<float>(tile->texture.size());
+    const Vec3 inside = Vec3(coordinates[i][0], coordinates[i][1], 0.0F) + first;
+    QUOIN_ASSERT(inside.x >= 0.0F && inside.x <= 1.0F && inside.y >= 0.0F && inside.y <= 1.0F, "faces of one voxel");
+    const Vec3 at = (Vec3(tile->x, tile->y, 0) + inside * size) * texel;
+    coordinates[i] = {at.x, at.y};
+  }
+}
+
+std::size_t MaterialPalette::face_image_count() const {
+  return has_face_atlas() ? std::min<std::size_t>(textures_.size(), 1) : textures_.size();
+}
+
+std::string MaterialPalette::face_image_name(std::size_t image) const {
+  QUOIN_ASSERT(image < face_image_count(), "an image of textured faces");
+  return has_face_atlas() ? "atlas" : textures_[image].name();
+}
+
 namespace {
 
-/// Returns for each vertex the lowest corner of the face that contains it: of all triangles that share vertices with
-/// its own. Coordinates relative to it are small, and exact in the samplers of clients.
-std::vector<Vec3> corners_of_faces(const MeshView& view) {
-  std::vector<std::uint32_t> face(view.positions.size());  // a vertex of the same face, at most its own index
-  std::iota(face.begin(), face.end(), 0U);
-  const auto first_of = [&](std::uint32_t vertex) {
-    for (; face[vertex] != vertex; vertex = face[vertex]) face[vertex] = face[face[vertex]];
-    return vertex;
-  };
-  for (std::size_t i = 0; i < view.indices.size(); i += 3) {
-    const std::array<std::uint32_t, 3> first = {first_of(view.indices[i]), first_of(view.indices[i + 1]),
-                                                first_of(view.indices[i + 2])};
-    for (const std::uint32_t each : first) face[first_of(each)] = std::min({first[0], first[1], first[2]});
+/// Returns the texels of a texture, multiplied by a tint in linear light, 0 to 1.
+std::vector<Rgba8> tinted(const Texture& texture, const Vec3& tint) {
+  std::vector<Rgba8> texels(texture.level(0).begin(), texture.level(0).end());
+  if (tint == Vec3(1.0F)) return texels;
+  for (Rgba8& texel : texels) {
+    const std::uint8_t alpha = texel.a;
+    texel = quoin::srgb_colour(linear_colour(texel) * tint);
+    texel.a = alpha;
   }
-  std::vector<Vec3> corners(view.positions.begin(), view.positions.end());
-  const auto vertices = static_cast<std::uint32_t>(face.size());
-  for (std::uint32_t i = 0; i < vertices; ++i) {
-    const std::uint32_t first = first_of(i);
-    corners[first] = glm::min(corners[first], view.positions[i]);
-  }
-  for (std::uint32_t i = 0; i < vertices; ++i) corners[i] = glm::floor(corners[first_of(i)]);
-  return corners;
+  return texels;
 }
 
 }  // namespace
 
-std::vector<std::array<float, 2>> MaterialPalette::face_coordinates(const MeshView& view) const {
-  const std::vector<Vec3> corners = corners_of_faces(view);
-  std::vector<std::array<float, 2>> coordinates(corners.size());
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    QUOIN_ASSERT(textured_type(view, i) != nullptr, "a textured face");
-    const Direction direction = view.directions[i];
-    const TextureFrame frame = texture_frame(types_[view.types[i]].faces[direction], direction);
-    coordinates[i] = texture_coordinates(frame, view.positions[i] - corners[i]);
+PngImage MaterialPalette::face_image(std::size_t image, const Vec3& tint) const {
+  QUOIN_ASSERT(image < face_image_count() && fits_, "an image of textured faces");
+  if (has_face_atlas()) return atlas_.image();
+  const Texture& of = textures_[image];
+  const auto size = static_cast<std::uint32_t>(of.size());
+  PngImage made{size, size, of.is_opaque() ? 3U : 4U, {}};
+  made.pixels.reserve(made.channels * of.level(0).size());
+  for (const Rgba8 shown : tinted(of, tint)) {
+    made.pixels.insert(made.pixels.end(), {shown.r, shown.g, shown.b});
+    if (!of.is_opaque()) made.pixels.push_back(shown.a);
   }
-  return coordinates;
+  return made;
 }
 
-PngImage MaterialPalette::image_of(std::size_t texture, const Vec3& tint) const {
-  QUOIN_ASSERT(texture < textures_.size(), "a texture that materials use");
-  const Texture& of = textures_[texture];
-  const auto size = static_cast<std::uint32_t>(of.size());
-  PngImage image{size, size, of.is_opaque() ? 3U : 4U, {}};
-  image.pixels.reserve(image.channels * of.level(0).size());
-  for (const Rgba8 texel : of.level(0)) {
-    const Rgba8 shown = tint == Vec3(1.0F) ? texel : quoin::srgb_colour(linear_colour(texel) * tint);
-    image.pixels.insert(image.pixels.end(), {shown.r, shown.g, shown.b});
-    if (!of.is_opaque()) image.pixels.push_back(texel.a);
+bool FaceAtlas::place() {
+  std::vector<Tile*> order;
+  for (Tile& tile : tiles_) order.push_back(&tile);
+  std::ranges::stable_sort(order, std::greater<>(), [](const Tile* tile) { return tile->texture.size(); });
+  for (int edge = 4 * kMargin; edge <= kMaxEdge; edge *= 2) {
+    // In rows as high as their first tile.
+    int x = 0;
+    int y = 0;
+    int end = 0;
+    for (Tile* const tile : order) {
+      const int size = tile->texture.size() + 2 * kMargin;
+      if (x + size > edge) {
+        x = 0;
+        y = end;
+      }
+      if (x == 0) end = y + size;
+      tile->x = x + kMargin;
+      tile->y = y + kMargin;
+      x += size;
+      if (size > edge || end > edge) break;
+    }
+    width_ = edge;
+    height_ = static_cast<int>(std::bit_ceil(static_cast<unsigned>(std::max(end, 1))));
+    const bool is_wide_enough = order.empty() || order.front()->texture.size() + 2 * kMargin <= edge;
+    if (is_wide_enough && end <= edge) return true;
+  }
+  return false;
+}
+
+PngImage FaceAtlas::image() const {
+  QUOIN_ASSERT(width_ > 0 && height_ > 0, "placed tiles");
+  const bool is_opaque = std::ranges::all_of(tiles_, [](const Tile& tile) { return tile.texture.is_opaque(); });
+  const std::size_t channels = is_opaque ? 3 : 4;
+  const auto width = static_cast<std::size_t>(width_);
+  Vec3 mean(0.0F);
+  float alpha = 0.0F;
+  for (const Tile& tile : tiles_) {
+    mean += tile.texture.mean() * linear_colour(tile.tint) / static_cast<float>(tiles_.size());
+    alpha += tile.texture.mean_alpha() / static_cast<float>(tiles_.size());
+  }
+  const Rgba8 between = quoin::srgb_colour(mean);
+  const std::array<std::uint8_t, 4> filling = {between.r, between.g, between.b,
+                                               byte_from_unit(static_cast<double>(alpha))};
+  PngImage image{static_cast<std::uint32_t>(width_),
+                 static_cast<std::uint32_t>(height_),
+                 static_cast<std::uint32_t>(channels),
+                 {}};
+  image.pixels.resize(channels * width * static_cast<std::size_t>(height_));
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = filling[i % channels];
+  for (const Tile& tile : tiles_) {
+    const int size = tile.texture.size();
+    const std::vector<Rgba8> texels = tinted(tile.texture, linear_colour(tile.tint));
+    for (int y = -kMargin; y < size + kMargin; ++y) {
+      const auto row = static_cast<std::size_t>(std::clamp(y, 0, size - 1) * size);
+      const auto first = static_cast<std::size_t>(tile.y + y) * width + static_cast<std::size_t>(tile.x - kMargin);
+      std::uint8_t* out = image.pixels.data() + channels * first;
+      for (int x = -kMargin; x < size + kMargin; ++x) {
+        const Rgba8 texel = texels[row + static_cast<std::size_t>(std::clamp(x, 0, size - 1))];
+        const std::array<std::uint8_t, 4> bytes = {texel.r, texel.g, texel.b, texel.a};
+        out = std::copy_n(bytes.begin(), channels, out);
+      }
+    }
   }
   return image;
 }

@@ -13,10 +13,13 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
+#include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/texture.h>
 #include <quoin/grid/voxel_registry.h>
+#include <quoin/io/mesh_file.h>
 #include <quoin/mesh/mesh_view.h>
+#include <quoin/mesh/vertex_writer.h>
 #include <quoin/scene/scene_meshes.h>
 
 #include "io/image/image_codecs.h"
@@ -121,13 +124,59 @@ struct SurfaceMaterial {
 enum class FaceColours : std::uint8_t {
   Means,     ///< the colour of the type
   Textures,  ///< a material per texture, tint and use of alpha; not in meshes with an atlas, which has their colours
+  Atlas,     ///< as Textures, with one image of all textures and tints, and a material per use of alpha
+};
+
+/// Returns the appearance of textured faces in a format with textures.
+[[nodiscard]] inline FaceColours face_colours_in(const MeshFileOptions& options) {
+  return options.textures_in == TexturesIn::Atlas ? FaceColours::Atlas : FaceColours::Textures;
+}
+
+/// One image of many textures and tints. A margin around each repeats its edge:
+///
+///   +--------------+--------------+     Positions and sizes are multiples of 16. So a texel of the mipmap levels 0 to
+///   | margin (16)  |              |     4, which covers up to 16 x 16 texels, has the colours of one texture, and
+///   |   +------+   |   +------+   |     filters that read the next texel at an edge stay within the margin.
+///   |   | tile |   |   | tile |   |
+///   |   +------+   |   +------+   |
+///   |              |              |
+///   +--------------+--------------+
+class FaceAtlas {
+ public:
+  static constexpr int kMargin = 16;
+  /// The maximum image size that devices support.
+  static constexpr int kMaxEdge = 16'384;
+
+  struct Tile {
+    Texture texture;
+    Rgba8 tint;
+    int x = 0;  ///< of the texture's upper left corner, without the margin
+    int y = 0;
+  };
+
+  /// Adds a texture with a tint. Requires: it was not added before.
+  void add(const Texture& texture, Rgba8 tint) { tiles_.push_back({texture, tint}); }
+  /// Places all tiles in an image whose sides are powers of two, large textures first. Returns false beyond kMaxEdge.
+  [[nodiscard]] bool place();
+
+  [[nodiscard]] const std::vector<Tile>& tiles() const { return tiles_; }
+  // The following require that `place` returned true.
+  [[nodiscard]] int width() const { return width_; }
+  [[nodiscard]] int height() const { return height_; }
+  /// Returns the image, without alpha if all textures are opaque. The space between tiles has their mean colour.
+  [[nodiscard]] PngImage image() const;
+
+ private:
+  std::vector<Tile> tiles_;  // in the order of `add`
+  int width_ = 0;
+  int height_ = 0;
 };
 
 /// The voxel types of a scene's meshes in the form of mesh formats: textures with one texel per type, and the few
 /// materials that use them.
 ///
 /// Each transparent type has its own material, with the light transmission of glass of the type's typical thickness.
-/// With FaceColours::Textures, textured faces have materials of their own instead.
+/// With FaceColours::Textures or Atlas, textured faces have materials of their own instead.
 ///
 /// Emission: strengths are sorted into bands, each from its strongest down to half of it; a band is a material. Within
 /// a band the emissive texel is the type's colour, scaled in linear light by strength / strongest. A file with one
@@ -137,6 +186,9 @@ class MaterialPalette {
   /// Only types used by blocks of the meshes get materials; all registered types get texels.
   /// Requires: valid meshes, whose types outlive this object.
   explicit MaterialPalette(const SceneMeshes& meshes, FaceColours faces = FaceColours::Means);
+
+  /// Returns LimitExceeded if the textures do not fit into an atlas. Then the palette must not be used.
+  [[nodiscard]] Status validate() const;
 
   [[nodiscard]] const VoxelRegistry& types() const { return types_; }
   [[nodiscard]] const std::vector<SurfaceMaterial>& materials() const { return materials_; }
@@ -154,13 +206,18 @@ class MaterialPalette {
   [[nodiscard]] bool is_textured(std::size_t material) const {
     return material >= materials_.size() + smooth_materials_.size();
   }
-  /// Returns the textures that materials use, each once.
-  [[nodiscard]] const std::vector<Texture>& textures() const { return textures_; }
-  /// Returns a texture as an image, without alpha if it is opaque. `tint`: multiplies it in linear light, 0 to 1.
-  /// Requires: an index into `textures`.
-  [[nodiscard]] PngImage image_of(std::size_t texture, const Vec3& tint = Vec3(1.0F)) const;
+  /// Returns the number of images that the materials of textured faces use: one per texture, or the atlas.
+  [[nodiscard]] std::size_t face_image_count() const;
+  /// Returns the name of the texture, or "atlas". Requires: an image of textured faces.
+  [[nodiscard]] std::string face_image_name(std::size_t image) const;
+  /// Returns a texture or the atlas as an image, without alpha if it is opaque. `tint`: multiplies it in linear light,
+  /// 0 to 1; not for the atlas. Requires: an image of textured faces.
+  [[nodiscard]] PngImage face_image(std::size_t image, const Vec3& tint = Vec3(1.0F)) const;
+  /// Returns true if textured faces use an atlas, which does not repeat.
+  [[nodiscard]] bool has_face_atlas() const { return faces_ == FaceColours::Atlas; }
   /// Returns the texture coordinates of each vertex of textured faces, from the upper left corner. Textures repeat, so
-  /// each face has coordinates relative to its own lowest corner, which are small. Requires: all faces are textured.
+  /// each face has coordinates relative to its own lowest corner, which are small. In an atlas, they lie within the
+  /// texture. Requires: all faces are textured and, for an atlas, cover one voxel each.
   [[nodiscard]] std::vector<std::array<float, 2>> face_coordinates(const MeshView& view) const;
   /// Returns true if blocks may have textured faces.
   [[nodiscard]] bool draws_textures() const { return draws_textures_; }
@@ -219,6 +276,9 @@ class MaterialPalette {
     auto operator<=>(const TexturedLook&) const = default;
   };
 
+  [[nodiscard]] std::size_t texture_of(const VoxelFace& face) const;
+  [[nodiscard]] const FaceAtlas::Tile& tile_of(const VoxelFace& face) const;
+  void move_into_atlas(const MeshView& view, std::vector<std::array<float, 2>>& coordinates) const;
   /// Returns the type of a block's vertex if its face is drawn with a texture.
   [[nodiscard]] const VoxelProperties* textured_type(const MeshView& view, std::size_t vertex) const;
   [[nodiscard]] TexturedLook textured_look(const MeshView& view, std::size_t vertex) const;
@@ -246,12 +306,17 @@ class MaterialPalette {
   bool has_light_ = false;         ///< vertex colours include all light, so types do not matter
   float smooth_thickness_ = 1.0F;  ///< the material of all transparent surfaces without types
   std::map<std::pair<SurfaceClass, std::size_t>, std::size_t> by_class_and_group_;
+  FaceColours faces_;
   bool draws_textures_ = false;
+  VertexWriter face_writer_;  // of texture coordinates
   TextureSet texture_layers_;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> texture_by_layer_;  // by array and layer
   std::vector<Texture> textures_;
   std::vector<SurfaceMaterial> textured_materials_;
   std::map<TexturedLook, std::size_t> textured_by_look_;
+  FaceAtlas atlas_;
+  bool fits_ = true;
+  std::map<std::pair<std::size_t, std::uint32_t>, std::size_t> tile_by_texture_;  // and tint
 };
 
 /// The surfaces of a part, one per material. A surface with a single material is borrowed, not copied.

@@ -11,10 +11,12 @@
 #include <variant>
 #include <vector>
 
+#include <glm/common.hpp>
 #include <quoin/core/assert.h>
 
 #include "core/rows/packed_row.h"
 #include "io/format_driver.h"
+#include "io/material_palette.h"
 #include "io/mesh_parts.h"
 #include "io/whole_file.h"
 
@@ -58,6 +60,8 @@ Status check_format(const SceneMeshes& meshes, FileFormat format, const MeshFile
       {options.compress, FormatCapability::Compression, "compressed meshes"},
       {options.quantize, FormatCapability::Compression, "quantized meshes"},
       {!meshes.atlas.rgb.empty(), FormatCapability::Textures, "an occlusion atlas"},
+      {options.textures_in == TexturesIn::Atlas && meshes.types.has_textures(), FormatCapability::Textures,
+       "an atlas of textures"},
       {options.occlusion_in == OcclusionIn::Attribute, FormatCapability::OcclusionAttribute,
        "occlusion as an attribute"},
       {has_light(meshes), FormatCapability::VertexLight, "light per vertex"},
@@ -69,6 +73,31 @@ Status check_format(const SceneMeshes& meshes, FileFormat format, const MeshFile
   return {};
 }
 
+/// Returns true if a triangle of blocks lies in the face of one voxel.
+bool is_in_voxel(const MeshView& view, std::size_t first_index) {
+  const std::uint32_t* const corner = view.indices.data() + first_index;
+  const Vec3& a = view.positions[corner[0]];
+  const Vec3& b = view.positions[corner[1]];
+  const Vec3& c = view.positions[corner[2]];
+  const Vec3 extent = glm::max(glm::max(a, b), c) - glm::floor(glm::min(glm::min(a, b), c));
+  return extent.x <= 1.0F && extent.y <= 1.0F && extent.z <= 1.0F;
+}
+
+/// An atlas cannot repeat a texture on a merged face. Errors: InvalidArgument.
+Status check_face_sizes(const SceneMeshes& meshes) {
+  for (const MeshPart& part : meshes.parts) {
+    for (const MeshView& view : part.surfaces) {
+      for (std::size_t i = 0; !view.has_albedo() && i < view.indices.size(); i += 3) {
+        if (meshes.types[view.types[view.indices[i]]].faces.empty() || is_in_voxel(view, i)) continue;
+        return make_error(ErrorCode::InvalidArgument,
+                          "cannot put textures into an atlas: part \"" + part.name +
+                              "\" has faces of several voxels (mesh with BlockySceneOptions::atlas)");
+      }
+    }
+  }
+  return {};
+}
+
 /// Returns the files of meshes. Errors: Unsupported; InvalidArgument; those of the formats.
 Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format, const std::filesystem::path& path,
                                    const MeshFileOptions& options) {
@@ -76,6 +105,9 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
   if (!driver) return driver.error();
   if (Status able = check_format(meshes, format, options); !able) return able.error();
   if (auto sound = check_meshes(meshes); !sound) return sound.error();
+  if (face_colours_in(options) == FaceColours::Atlas && meshes.types.has_textures()) {
+    if (auto sound = check_face_sizes(meshes); !sound) return sound.error();
+  }
   return (*driver)->plan_mesh(meshes, path, options);
 }
 
@@ -236,7 +268,7 @@ Result<std::vector<std::filesystem::path>> mesh_files(const SceneMeshes& meshes,
   if (!driver) return with_path(Result<std::vector<std::filesystem::path>>(driver.error()), path);
   std::vector<std::filesystem::path> files = {path};
   if ((*driver)->mesh_companions != nullptr) {
-    std::ranges::move((*driver)->mesh_companions(meshes, path), std::back_inserter(files));
+    std::ranges::move((*driver)->mesh_companions(meshes, path, options), std::back_inserter(files));
   }
   return files;
 }

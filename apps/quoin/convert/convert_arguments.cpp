@@ -117,8 +117,10 @@ void add_meshing_options(CLI::App& command, ConvertOptions& options) {
                              "Colours of smooth surfaces around voxels: sharp or blended (default sharp)");
   add_choice<bool>(
       command, "--texture", {{"palette", false}, {"atlas", true}}, options.is_atlas,
-      "Colours of blocks (default palette). palette: a palette texture, with occlusion per vertex. atlas: an "
-      "atlas with occlusion, about a third fewer triangles (.glb, .gltf, .obj)");
+      "Colours of blocks (default palette). palette: a palette texture, with occlusion per vertex, and an image per "
+      "texture of the types. atlas: an atlas with occlusion, about a third fewer triangles; if types have textures, "
+      "one "
+      "image of all textures, with their faces unmerged (.glb, .gltf, .obj)");
   command.add_flag("--no-ao", options.occlusion_off, "Write no ambient occlusion");
   command.add_flag("--watertight", options.watertight,
                    "Write no T-junctions: edges end at the corners of their neighbours. Smooth meshes never have them");

@@ -43,7 +43,7 @@ struct ConvertOptions {
   std::optional<double> simplify;
   std::optional<double> smoothness;  ///< for smooth surfaces around voxels
   std::optional<SurfaceColours> colours;
-  bool is_atlas = false;              ///< an atlas texture instead of a palette
+  bool is_atlas = false;              ///< an atlas instead of a palette, or of images per texture
   std::optional<LightOptions> light;  ///< propagated light, stored at vertices
   bool animate = false;               ///< writes all frames as a glTF animation
   double frames_per_second = 10.0;    ///< for `animate`

@@ -157,6 +157,7 @@ namespace {
 MeshFileOptions mesh_file_options(const ConvertOptions& options, FileFormat format) {
   MeshFileOptions file;
   if (options.ao_as_attribute) file.occlusion_in = OcclusionIn::Attribute;
+  if (options.is_atlas) file.textures_in = TexturesIn::Atlas;
   file.compress = options.compress;
   file.quantize = options.quantize;
   if (options.scale) file.scale = *options.scale;
@@ -167,7 +168,7 @@ MeshFileOptions mesh_file_options(const ConvertOptions& options, FileFormat form
 /// Returns the number of types of the meshes whose textures the file lacks.
 std::size_t lost_textures(const SceneMeshes& meshes, FileFormat format) {
   if (!meshes.types.has_textures()) return 0;
-  const bool has_blocks = can(format, FormatCapability::Faces) && meshes.atlas.rgb.empty();
+  const bool has_blocks = can(format, FormatCapability::Faces);
   std::vector<bool> is_lost(meshes.types.size());
   for (const MeshPart& part : meshes.parts) {
     for (const MeshView& view : part.surfaces) {
@@ -190,8 +191,7 @@ void warn_of_meshes(const SceneMeshes& meshes, FileFormat format, const MeshFile
     }
   }
   if (const std::size_t lost = lost_textures(meshes, format); lost > 0) {
-    const char* const reason = meshes.atlas.rgb.empty() ? "" : ", since the atlas holds the colours of blocks";
-    warnings.push_back("textures of types left out" + std::string(reason) + ": " + std::to_string(lost));
+    warnings.push_back("textures of types left out: " + std::to_string(lost));
   }
   if (const DVec3 offset = mesh_file_offset(meshes, format, file); offset != DVec3(0.0)) {
     warnings.push_back("coordinates in the file are relative to (" + number_for_people(offset.x) + ", " +
@@ -215,16 +215,16 @@ Status write_meshes(SceneMeshes& meshes, const ConvertOptions& options, Progress
         "error");
   }
   if (outcome.meshes.triangles == 0) outcome.warnings.emplace_back("the mesh is empty");
-  const auto files = mesh_files(meshes, options.output);
-  if (!files) return files.error();
-  outcome.files = *files;
-  // The earlier check covers only OUT, not the files written next to it.
-  for (const auto& file : *files) {
-    if (auto kept = check_replaced(file, options.inputs, options.force); !kept) return kept;
-  }
   const auto format = format_for_writing(options.output);
   if (!format) return format.error();
   const MeshFileOptions file = mesh_file_options(options, format->format);
+  const auto files = mesh_files(meshes, options.output, file);
+  if (!files) return files.error();
+  outcome.files = *files;
+  // The earlier check covers only OUT, not the files written next to it.
+  for (const auto& each : *files) {
+    if (auto kept = check_replaced(each, options.inputs, options.force); !kept) return kept;
+  }
   warn_of_meshes(meshes, format->format, file, outcome.warnings);
   const auto bytes = write_mesh(meshes, options.output, file, bar.listener("writing"));
   if (!bytes) return bytes.error();

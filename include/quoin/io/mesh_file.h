@@ -24,6 +24,15 @@ enum class OcclusionIn : std::uint8_t {
   Attribute,
 };
 
+/// The storage of the textures of faces (VoxelProperties::faces) in a mesh file.
+enum class TexturesIn : std::uint8_t {
+  Images,  ///< an image and materials per texture, which repeat on merged faces
+  /// One image of all textures and tints, and a material per use of alpha, so that clients draw the faces at once. A
+  /// margin around each texture keeps its colours apart from those of others in the mipmap levels 0 to 4. Textures
+  /// cannot repeat in it, so each textured face must cover one voxel (BlockySceneOptions::atlas).
+  Atlas,
+};
+
 struct MeshFileOptions {
   std::optional<FileFormat> format{};  ///< a mesh format; default: from the path's extension
   bool write_occlusion = true;         ///< false drops the meshes' occlusion
@@ -32,6 +41,7 @@ struct MeshFileOptions {
   UpAxis up = UpAxis::Y;  ///< Z: the point (x, y, z) is written as (x, -z, y)
   bool quantize = false;  ///< glTF: integer vertices, which need a recent loader
   bool compress = false;  ///< glTF: meshoptimizer compression, which the loader must support
+  TexturesIn textures_in = TexturesIn::Images;
 };
 
 /// Writes meshes to a file. Returns the total size of all written files.
@@ -57,7 +67,10 @@ struct MeshFileOptions {
 ///            metalness and emission, instead of the palette. TEXCOORD_0 counts voxels, and the texture repeats:
 ///            nearest filter when enlarged, mipmaps when reduced. The tint is the baseColorFactor. Emission has the
 ///            colours of the texture. Cutout faces have the alpha mode MASK and two sides, translucent ones BLEND,
-///            without transmission. With an atlas, blocks have the mean colours of their textures.
+///            without transmission. With SceneMeshes::atlas, blocks have the mean colours of their textures.
+///            TexturesIn::Atlas: one image of all textures and tints, which does not repeat, and one material per use
+///            of alpha, roughness, metalness and emission. Each texture has a margin of 16 texels that repeats its
+///            edge, so mipmap levels 0 to 4 do not mix textures. Clients also use higher levels, which do.
 ///            Transparent types: one blended material each, with KHR_materials_transmission, KHR_materials_volume and
 ///            KHR_materials_ior. These and alpha match rendered images of the type's bodies at typical thickness
 ///            (MeshPart::thickness).
@@ -90,8 +103,9 @@ struct MeshFileOptions {
 ///            NAME_palette.png, NAME_emissive.png (if a type emits light) and NAME_atlas.png (with an atlas) next to
 ///            NAME.obj. Textured faces have materials as in glTF: map_Kd is NAME_texture_1.png and so on, an image of
 ///            each texture and tint, with the texture's alpha; map_d of cutout and translucent faces is a grey image,
-///            NAME_alpha_1.png and so on. Without an atlas, occlusion is a grey colour after the vertex coordinates
-///            ("v x y z r g b"), an extension that many programs read. Each transparent type has its own material with
+///            NAME_alpha_1.png and so on. With TexturesIn::Atlas, there is one of each. Without an occlusion atlas,
+///            occlusion is a grey colour after the vertex coordinates ("v x y z r g b"), an extension that many
+///            programs read. Each transparent type has its own material with
 ///            d, Tf and Ni. Smooth meshes: nine digits, sRGB colours after the coordinates, no materials.
 ///            OcclusionIn::Attribute is not supported.
 /// PLY:       version 1.0, binary, little-endian, in world units: floats x y z and nx ny nz, bytes red green blue
@@ -114,11 +128,12 @@ struct MeshFileOptions {
 ///            largest array as stored.
 /// Errors:    Unsupported for formats without meshes; for light, `quantize` and `compress` outside glTF; for an atlas
 ///            with occlusion in PLY, STL and 3MF; for OcclusionIn::Attribute in OBJ, STL and 3MF; for `compress` in
-///            builds without meshoptimizer. CannotWrite. Cancelled. LimitExceeded beyond 4 GiB of GLB, or 2^31 - 1
-///            vertices or triangles of PLY. InvalidArgument if no format has the name of `format`, a transform is not
-///            finite, not affine or singular, the scale is not positive, a vertex exceeds the range of floats, or a
-///            mesh is inconsistent (array lengths that differ, vertex indices out of range, unregistered types,
-///            infinite numbers). Each file is written atomically; if a later file fails, earlier ones stay.
+///            builds without meshoptimizer. CannotWrite. Cancelled. LimitExceeded beyond 4 GiB of GLB, 2^31 - 1
+///            vertices or triangles of PLY, or 16,384 texels per side of an atlas of textures. InvalidArgument if no
+///            format has the name of `format`, a transform is not finite, not affine or singular, the scale is not
+///            positive, a vertex exceeds the range of floats, a mesh is inconsistent (array lengths that differ, vertex
+///            indices out of range, unregistered types, infinite numbers), or its textured faces are merged with
+///            TexturesIn::Atlas. Each file is written atomically; if a later file fails, earlier ones stay.
 /// Sources:   Khronos glTF 2.0 specification, sections 3 and 4.4; KHR_materials_emissive_strength, _transmission,
 ///            _volume, _ior and _unlit; KHR_mesh_quantization; EXT_meshopt_compression; Alias/Wavefront's OBJ and MTL.
 [[nodiscard]] Result<std::uint64_t> write_mesh(const SceneMeshes& meshes, const std::filesystem::path& path,

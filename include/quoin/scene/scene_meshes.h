@@ -140,6 +140,9 @@ struct BlockySceneOptions {
   /// Stores colours and occlusion of opaque, non-emissive blocks in a texture, SceneMeshes::atlas. Faces then merge
   /// across occlusion changes, which saves about a third of the triangles. With linear filtering, each voxel face is
   /// shaded bilinearly between its four corners, without a visible diagonal edge.
+  ///
+  /// If the scene has types with textures, splits their faces into those of voxels instead, so that a file can have all
+  /// textures in one image (MeshFileOptions::textures_in). Occlusion then stays at the vertices.
   bool atlas = false;
   /// BlockyMeshOptions::cut for each grid; replaces the one in `mesh`.
   std::function<void(GridHandle grid, IVec3 chunk, QuadBuffer& quads)> cut{};

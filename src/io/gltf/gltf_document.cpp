@@ -276,11 +276,13 @@ void add_textures(const GltfLayout& layout, Arrays& arrays, Json& document) {
   const auto sampler = [](int filter, int far_filter, int wrap) {
     return Json{{"magFilter", filter}, {"minFilter", far_filter}, {"wrapS", wrap}, {"wrapT", wrap}};
   };
-  // Linear filtering interpolates between the corners of voxels, never across patches. Textures of faces repeat.
+  // Linear filtering interpolates between the corners of voxels, never across patches. Textures of faces repeat, except
+  // in an atlas.
+  const int wrap_of_faces = layout.palette.has_face_atlas() ? kClampToEdge : kRepeat;
   const std::array<std::pair<GltfImageKind, Json>, 3> samplers = {
       {{GltfImageKind::Palette, sampler(kNearest, kNearest, kClampToEdge)},
        {GltfImageKind::Atlas, sampler(kLinear, kLinear, kClampToEdge)},
-       {GltfImageKind::Face, sampler(kNearest, kNearestLinearMipmaps, kRepeat)}}};
+       {GltfImageKind::Face, sampler(kNearest, kNearestLinearMipmaps, wrap_of_faces)}}};
   const auto kind_of = [](GltfImageKind kind) {
     return kind == GltfImageKind::Atlas || kind == GltfImageKind::Face ? kind : GltfImageKind::Palette;
   };

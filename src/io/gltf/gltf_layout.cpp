@@ -242,10 +242,10 @@ Status add_image(GltfImageKind kind, std::string name, const PngImage& image, Gl
 }
 
 Status add_face_images(GltfLayout& layout) {
-  const std::vector<Texture>& textures = layout.palette.textures();
-  for (std::size_t i = 0; i < textures.size(); ++i) {
-    const PngImage image = layout.palette.image_of(i);
-    if (Status added = add_image(GltfImageKind::Face, textures[i].name(), image, layout); !added) return added;
+  const MaterialPalette& palette = layout.palette;
+  for (std::size_t i = 0; i < palette.face_image_count(); ++i) {
+    const PngImage image = palette.face_image(i);
+    if (Status added = add_image(GltfImageKind::Face, palette.face_image_name(i), image, layout); !added) return added;
   }
   return {};
 }
@@ -508,11 +508,12 @@ Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, const MeshFileOptions
                       "cannot compress meshes: Quoin was built without meshoptimizer (Debian: libmeshoptimizer-dev)");
   }
   QUOIN_ASSERT(check_meshes(meshes).has_value(), "sound meshes");
-  GltfLayout layout{.palette = MaterialPalette(meshes, FaceColours::Textures),
+  GltfLayout layout{.palette = MaterialPalette(meshes, face_colours_in(options)),
                     .nodes = {},
                     .meshes = {},
                     .images = {},
                     .surfaces = {}};
+  if (Status sound = layout.palette.validate(); !sound) return sound.error();
   layout.is_unlit = has_light(meshes);
   for (const MeshPart& part : meshes.parts) layout.surfaces.emplace_back(part, layout.palette);
   for (const MeshPlacement& placement : meshes.placements) {

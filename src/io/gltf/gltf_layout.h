@@ -131,7 +131,7 @@ struct GltfLayout {
   MaterialPalette palette;
   std::vector<GltfNode> nodes;  ///< the placements in their order, then the groups
   std::vector<GltfMesh> meshes;
-  std::vector<GltfImage> images;           ///< textures of blocks; those of MaterialPalette::textures come last
+  std::vector<GltfImage> images;           ///< textures of blocks; MaterialPalette::face_image come last
   std::vector<MaterialSurfaces> surfaces;  ///< by part
   std::vector<GltfChannel> channels{};     ///< the animation's times and values; after the images
   std::vector<Lamp> lamps{};               ///< lamps that give light; their nodes come after `nodes`
@@ -180,6 +180,7 @@ void write_gltf_array(const MaterialPalette& palette, const GltfMesh& mesh, cons
                                                       const MeshFileOptions& options);
 /// Returns the files that plan_gltf writes next to `path`.
 [[nodiscard]] std::vector<std::filesystem::path> gltf_companions(const SceneMeshes& meshes,
-                                                                 const std::filesystem::path& path);
+                                                                 const std::filesystem::path& path,
+                                                                 const MeshFileOptions& options);
 
 }  // namespace quoin

@@ -68,7 +68,7 @@ class GltfTextures : public Gltf {
   }
 
   // Compares the texels of all faces in the file with the voxels of its only grid, and returns the number of points.
-  int expect_faces(const ParsedGlb& glb, const Grid& grid) const {
+  int expect_faces(const ParsedGlb& glb, const Grid& grid, int wrap = 10'497) const {
     int points = 0;
     const Json& document = glb.document;
     for (const Json& node : document["nodes"]) {
@@ -81,8 +81,8 @@ class GltfTextures : public Gltf {
         const Json& material = document["materials"][primitive["material"].get<std::size_t>()];
         const std::size_t texture = material["pbrMetallicRoughness"]["baseColorTexture"]["index"];
         const Json& sampler = document["samplers"][document["textures"][texture]["sampler"].get<std::size_t>()];
-        if (sampler["wrapS"] != 10497) continue;
-        EXPECT_TRUE(sampler["wrapT"] == 10497 && sampler["magFilter"] == 9728 && sampler["minFilter"] == 9986);
+        if (sampler["minFilter"] != 9986) continue;
+        EXPECT_TRUE(sampler["wrapS"] == wrap && sampler["wrapT"] == wrap && sampler["magFilter"] == 9728);
         points += expect_primitive(glb, primitive, material, grid, origin);
       }
     }
@@ -122,17 +122,21 @@ class GltfTextures : public Gltf {
           return points;
         }
         // Rounding decides between texels at their borders.
-        const auto is_at_border = [&](double share) {
-          return std::abs(share * image.width - std::round(share * image.width)) < 1e-6;
+        const auto is_at_border = [&](double share, std::uint32_t size) {
+          return std::abs(share * size - std::round(share * size)) < 1e-6;
         };
-        const auto texel = [&](double share) {
-          return static_cast<std::size_t>((share - std::floor(share)) * image.width);
+        const auto texel = [&](double share, std::uint32_t size) {
+          return static_cast<std::size_t>((share - std::floor(share)) * size);
         };
-        const std::uint8_t* pixel = image.pixels.data() + 4 * (texel(st[1]) * image.width + texel(st[0]));
+        const std::size_t row = texel(st[1], image.height) * image.width;
+        const std::uint8_t* pixel = image.pixels.data() + 4 * (row + texel(st[0], image.width));
         const Vec3 shown = linear_colour(Rgba8{pixel[0], pixel[1], pixel[2]}) * factor;
         const auto expected = texel_at(type.faces[direction], direction, at - DVec3(voxel), 0);
-        const bool is_equal = glm::distance(shown, Vec3(expected[0], expected[1], expected[2])) < 1e-4F;
-        if (!is_equal && !is_at_border(st[0]) && !is_at_border(st[1])) {
+        const Vec3 wanted(expected[0], expected[1], expected[2]);
+        // An atlas has the tints, rounded to bytes.
+        const bool is_rounded = factor == Vec3(1.0F) && Rgba8{pixel[0], pixel[1], pixel[2]} == srgb_colour(wanted);
+        const bool is_equal = is_rounded || glm::distance(shown, wanted) < 1e-4F;
+        if (!is_equal && !is_at_border(st[0], image.width) && !is_at_border(st[1], image.height)) {
           ADD_FAILURE() << "voxel " << voxel.x << ' ' << voxel.y << ' ' << voxel.z << " face " << name_of(direction);
           return points;
         }
@@ -265,14 +269,155 @@ TEST_F(GltfTextures, AreReadBackByMeshReaders) {
   }
 }
 
-TEST_F(GltfTextures, GiveWayToAnAtlas) {
-  const VoxelType stone = add({.name = "stone", .faces = random_texture("stone", 16, 1)});
+TEST_F(GltfTextures, GiveWayToAnOcclusionAtlas) {
+  const VoxelType stone = add({.name = "stone", .colour = {90, 90, 90}});
   Grid grid;
   grid.set({0, 0, 0}, stone);
   add_grid(grid);
-  const ParsedGlb glb = write(mesh_scene(scene_, {.atlas = true}).value());
-  for (const Json& image : glb.document["images"]) EXPECT_NE(image["name"], "stone");
-  EXPECT_EQ(glb.document["materials"].size(), 1U);
+  SceneMeshes meshes = mesh_scene(scene_, {.atlas = true}).value();
+  ASSERT_FALSE(meshes.atlas.rgb.empty());
+  meshes.types.replace(stone, {.name = "stone", .faces = random_texture("stone", 16, 1)});
+  for (const TexturesIn textures_in : {TexturesIn::Images, TexturesIn::Atlas}) {
+    const auto bytes = write_mesh(meshes, FileFormat::Glb, {.textures_in = textures_in});
+    ASSERT_TRUE(bytes) << to_string(bytes.error());
+    const ParsedGlb glb = parse_glb(*bytes);
+    for (const Json& image : glb.document["images"]) EXPECT_NE(image["name"], "stone");
+    EXPECT_EQ(glb.document["materials"].size(), 1U);
+  }
+}
+
+class GltfTextureAtlas : public GltfTextures {
+ protected:
+  ParsedGlb write_atlas() {
+    const auto bytes =
+        write_mesh(mesh_scene(scene_, {.atlas = true}).value(), FileFormat::Glb, {.textures_in = TexturesIn::Atlas});
+    EXPECT_TRUE(bytes) << to_string(bytes.error());
+    return parse_glb(bytes.value());
+  }
+  static constexpr int kClamp = 33'071;
+};
+
+TEST_F(GltfTextureAtlas, HasTheTexelsOfAllFaces) {
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    scene_ = {};
+    const Grid grid = random_grid(seed);
+    add_grid(grid);
+    const ParsedGlb glb = write_atlas();
+    EXPECT_GT(expect_faces(glb, grid, kClamp), 10'000) << "seed " << seed;
+    std::multiset<std::string> names;
+    for (const Json& image : glb.document["images"]) names.insert(image["name"]);
+    EXPECT_EQ(names, (std::multiset<std::string>{"palette", "palette metallic-roughness", "atlas"}));
+    EXPECT_EQ(glb.document["materials"].size(), 2U) << "of plain and textured types";
+  }
+}
+
+TEST_F(GltfTextureAtlas, HasAMaterialPerUseOfAlpha) {
+  const Texture stone = random_texture("stone", 16, 1);
+  const Texture leaf = random_texture("leaf", 32, 2, true);
+  Grid grid;
+  int x = 0;
+  const auto put = [&](VoxelProperties type) { grid.set({2 * x++, 0, 0}, add(std::move(type))); };
+  put({.name = "a", .faces = stone});
+  put({.name = "b", .faces = VoxelFace{.texture = stone, .tint = {255, 0, 0, 255}}});
+  put({.name = "c", .emission = 4.0F, .faces = VoxelFace{.texture = stone, .tint = {0, 99, 0, 255}}});
+  for (const FaceAlpha alpha : {FaceAlpha::Cutout, FaceAlpha::Translucent}) {
+    put({.name = "d", .visibility = Visibility::Transparent, .faces = VoxelFace{.texture = leaf, .alpha = alpha}});
+  }
+  add_grid(grid);
+  const ParsedGlb glb = write_atlas();
+  EXPECT_GT(expect_faces(glb, grid, kClamp), 0);
+  ASSERT_EQ(glb.document["images"].size(), 1U);
+  ASSERT_EQ(glb.document["materials"].size(), 4U);
+  std::multiset<std::string> modes;
+  for (const Json& material : glb.document["materials"]) {
+    EXPECT_EQ(material["pbrMetallicRoughness"]["baseColorTexture"]["index"], 0);
+    EXPECT_FALSE(material["pbrMetallicRoughness"].contains("baseColorFactor")) << "tints are in the atlas";
+    modes.insert(material.contains("emissiveTexture") ? "glows" : material.value("alphaMode", "OPAQUE"));
+  }
+  EXPECT_EQ(modes, (std::multiset<std::string>{"OPAQUE", "glows", "MASK", "BLEND"}));
+}
+
+// Halves an image by means of 2 x 2 texels, as clients do.
+PngImage halved(const PngImage& image) {
+  PngImage half{image.width / 2, image.height / 2, 4, {}};
+  for (std::uint32_t y = 0; y < half.height; ++y) {
+    for (std::uint32_t x = 0; x < half.width; ++x) {
+      for (std::uint32_t channel = 0; channel < 4; ++channel) {
+        const auto at = [&](std::uint32_t i, std::uint32_t j) {
+          return image.pixels[4 * ((2 * y + j) * image.width + 2 * x + i) + channel];
+        };
+        half.pixels.push_back(static_cast<std::uint8_t>((at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1) + 2) / 4));
+      }
+    }
+  }
+  return half;
+}
+
+// Each type has textures of one colour, so at its faces' corners all texels that a linear filter reads have it.
+TEST_F(GltfTextureAtlas, KeepsTexturesApartInFiveMipmapLevels) {
+  std::mt19937 random(4);
+  Grid grid;
+  for (int i = 0; i < 30; ++i) {
+    const int size = 16 << (random() % 4);
+    AlphaImage image{size, size, {}};
+    const std::array<std::uint8_t, 4> colour = {static_cast<std::uint8_t>(random()),
+                                                static_cast<std::uint8_t>(random()), static_cast<std::uint8_t>(8 * i),
+                                                255};
+    for (int k = 0; k < 4 * size * size; ++k) image.rgba.push_back(colour[static_cast<std::size_t>(k % 4)]);
+    const VoxelFaces faces(Texture::from_image(std::to_string(i), image).value());
+    grid.fill_box({{i % 6 * 3, 0, i / 6 * 4}, {i % 6 * 3 + 1, 2, i / 6 * 4 + 3}}, add({.name = "a", .faces = faces}));
+  }
+  add_grid(grid);
+  const ParsedGlb glb = write_atlas();
+  const Json& primitive = glb.document["meshes"][0]["primitives"][0];
+  const auto positions = glb.vectors(primitive, "POSITION");
+  const auto uv = glb.array<std::array<float, 2>>(primitive["attributes"]["TEXCOORD_0"].get<std::size_t>());
+  PngImage level = glb.image(0);
+  for (int number = 0; number <= 4; ++number, level = halved(level)) {
+    const auto texel = [&](float share, std::uint32_t size, int next) {
+      const int i = static_cast<int>(std::floor(share * static_cast<float>(size) - 0.5F)) + next;
+      return static_cast<std::size_t>(std::clamp(i, 0, static_cast<int>(size) - 1));
+    };
+    for (std::size_t i = 0; i < uv.size(); ++i) {
+      const IVec3 cell(IVec3(positions[i]) / IVec3(3, 1, 4) * IVec3(3, 1, 4));
+      const Rgba8 expected = scene_.types[grid.get({cell.x, 0, cell.z})].colour;
+      for (int k = 0; k < 4; ++k) {
+        const std::size_t at = texel(uv[i][1], level.height, k / 2) * level.width + texel(uv[i][0], level.width, k % 2);
+        const std::uint8_t* const pixel = level.pixels.data() + 4 * at;
+        ASSERT_EQ((Rgba8{pixel[0], pixel[1], pixel[2]}), (Rgba8{expected.r, expected.g, expected.b}))
+            << "level " << number << ", vertex " << i;
+      }
+    }
+  }
+}
+
+TEST_F(GltfTextureAtlas, RefusesMergedFacesAndHugeImages) {
+  const VoxelType stone = add({.name = "stone", .faces = random_texture("stone", 16, 1)});
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {2, 1, 1}}, stone);
+  add_grid(grid);
+  const MeshFileOptions options{.textures_in = TexturesIn::Atlas};
+  const auto merged = write_mesh(mesh_scene(scene_).value(), FileFormat::Glb, options);
+  ASSERT_FALSE(merged);
+  EXPECT_EQ(merged.error().code, ErrorCode::InvalidArgument);
+  EXPECT_NE(to_string(merged.error()).find("faces of several voxels"), std::string::npos);
+  const SceneMeshes split = mesh_scene(scene_, {.atlas = true}).value();
+  EXPECT_EQ(split.stats.quads, 10);
+  EXPECT_TRUE(split.atlas.rgb.empty());
+  EXPECT_EQ(write_mesh(split, FileFormat::Ply, options).error().code, ErrorCode::Unsupported);
+  // 250 tints of a large texture need more than 16,384 x 16,384 texels.
+  const Texture large = random_texture("large", 1'024, 2);
+  for (int i = 0; i < 250; ++i) {
+    grid.set({i, 5, 0},
+             add({.name = "a", .faces = VoxelFace{.texture = large, .tint = {static_cast<std::uint8_t>(i)}}}));
+  }
+  const VoxelRegistry types = scene_.types;
+  scene_ = {};
+  scene_.types = types;
+  add_grid(grid);
+  const auto huge = write_mesh(mesh_scene(scene_, {.atlas = true}).value(), FileFormat::Glb, options);
+  ASSERT_FALSE(huge);
+  EXPECT_EQ(huge.error().code, ErrorCode::LimitExceeded);
 }
 
 }  // namespace

@@ -420,7 +420,8 @@ Result<std::vector<MeshFile>> plan_gltf(const SceneMeshes& meshes, const std::fi
   return files;
 }
 
-std::vector<std::filesystem::path> gltf_companions(const SceneMeshes& meshes, const std::filesystem::path& path) {
+std::vector<std::filesystem::path> gltf_companions(const SceneMeshes& meshes, const std::filesystem::path& path,
+                                                   const MeshFileOptions& /*options*/) {
   for (const MeshPlacement& placement : meshes.placements) {
     if (placement.part >= meshes.parts.size()) continue;
     const auto& surfaces = meshes.parts[placement.part].surfaces;

@@ -610,11 +610,12 @@ class FaceImages {
   static Image alpha_of(const SurfaceMaterial& material) { return {true, colour_of(material).texture}; }
 
   static PngImage pixels_of(const Image& image, const MaterialPalette& palette) {
-    if (!image.is_alpha) return palette.image_of(image.texture, {image.red, image.green, image.blue});
-    const Texture& texture = palette.textures()[image.texture];
-    const auto size = static_cast<std::uint32_t>(texture.size());
-    PngImage grey{size, size, 3, {}};
-    for (const Rgba8 texel : texture.level(0)) grey.pixels.insert(grey.pixels.end(), 3, texel.a);
+    PngImage made = palette.face_image(image.texture, {image.red, image.green, image.blue});
+    if (!image.is_alpha) return made;
+    PngImage grey{made.width, made.height, 3, {}};
+    for (std::size_t i = made.channels - 1; i < made.pixels.size(); i += made.channels) {
+      grey.pixels.insert(grey.pixels.end(), 3, made.channels == 4 ? made.pixels[i] : std::uint8_t{255});
+    }
     return grey;
   }
 
@@ -833,8 +834,9 @@ Status add_image(const std::filesystem::path& path, const PngImage& image, std::
 }
 
 Result<std::vector<MeshFile>> plan_obj(const SceneMeshes& meshes, const std::filesystem::path& path,
-                                       const MeshFileOptions& /*options*/) {
-  const auto palette = std::make_shared<const MaterialPalette>(meshes, FaceColours::Textures);
+                                       const MeshFileOptions& options) {
+  const auto palette = std::make_shared<const MaterialPalette>(meshes, face_colours_in(options));
+  if (Status sound = palette->validate(); !sound) return sound.error();
   const ObjNames names = names_beside(path);
   std::vector<MeshFile> files;
   if (has_materials(meshes)) {
@@ -857,13 +859,14 @@ Result<std::vector<MeshFile>> plan_obj(const SceneMeshes& meshes, const std::fil
   return files;
 }
 
-std::vector<std::filesystem::path> obj_companions(const SceneMeshes& meshes, const std::filesystem::path& path) {
+std::vector<std::filesystem::path> obj_companions(const SceneMeshes& meshes, const std::filesystem::path& path,
+                                                  const MeshFileOptions& options) {
   if (!has_materials(meshes)) return {};
   const ObjNames names = names_beside(path);
   std::vector<std::filesystem::path> files = {names.library, names.palette};
   if (!meshes.atlas.rgb.empty()) files.push_back(names.atlas);
   if (meshes.types.has_textures() && check_meshes(meshes)) {
-    const auto palette = std::make_shared<const MaterialPalette>(meshes, FaceColours::Textures);
+    const auto palette = std::make_shared<const MaterialPalette>(meshes, face_colours_in(options));
     if (palette->has_emission()) files.push_back(names.emissive);
     std::vector<MeshFile> images;
     FaceImages(palette, names).add_to(images);

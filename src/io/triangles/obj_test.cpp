@@ -305,6 +305,62 @@ TEST_F(Obj, RepeatsTexturesOnFaces) {
   EXPECT_EQ(files.size(), folder_.count());
 }
 
+TEST_F(Obj, PutsTexturesIntoOneImage) {
+  Grid& grid = scene_.edit(grid_).grid;
+  for (std::uint8_t i = 0; i < 6; ++i) {
+    const bool is_leaf = i % 2 == 1;
+    const int size = 16 << (i % 3);
+    AlphaImage image{size, size, {}};
+    for (int k = 0; k < size * size; ++k) {
+      image.rgba.insert(image.rgba.end(), {200, 30, std::uint8_t(20 * i), std::uint8_t(is_leaf ? 140 + i : 255)});
+    }
+    VoxelFace face{.texture = Texture::from_image("t", image).value(), .tint = {255, 255, std::uint8_t(255 - i)}};
+    if (is_leaf) face.alpha = i == 1 ? FaceAlpha::Cutout : FaceAlpha::Translucent;
+    VoxelProperties type{.name = "t"};
+    if (is_leaf) type.visibility = Visibility::Transparent;
+    type.faces = face;
+    grid.fill_box({{3 * i, 5, 0}, {3 * i + 2, 6, 2}}, scene_.types.add(type).value());
+  }
+  scene_.edit(grid_).pivot = DVec3(0.0);
+  place({0, 0, 0});
+  meshes_ = *mesh_scene(scene_, {.atlas = true});
+  const MeshFileOptions options{.textures_in = TexturesIn::Atlas};
+  const auto path = folder_.file("my model.obj");
+  ASSERT_TRUE(write_mesh(meshes_, path, options));
+  const auto files = mesh_files(meshes_, path, options).value();
+  for (const auto& file : files) EXPECT_TRUE(std::filesystem::exists(file)) << file;
+  EXPECT_EQ(files.size(), folder_.count());
+  const ParsedObj obj = parse_obj(path);
+  const std::string library = text_of(folder_.file("my model.mtl"));
+  const PngImage image = *decode_png(*read_file(folder_.file("my model_texture_1.png")));
+  const PngImage alpha = *decode_png(*read_file(folder_.file("my model_alpha_1.png")));
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("my model_texture_2.png")));
+  std::set<std::string> materials;
+  for (std::size_t i = 0; i < obj.faces.size(); ++i) {
+    const std::string& material = obj.materials[obj.material_of_face[i]];
+    if (value_in(library, material, "map_Kd ") != "my model_texture_1.png") continue;
+    materials.insert(material);
+    DVec3 at(0.0);
+    glm::dvec2 uv(0.0);
+    std::array<DVec3, 3> corner;
+    for (std::size_t k = 0; k < 3; ++k) {
+      corner[k] = obj.positions.at(obj.faces[i][k].position);
+      at += corner[k] / 3.0;
+      uv += glm::dvec2(obj.textures.at(obj.faces[i][k].texture)[0], obj.textures.at(obj.faces[i][k].texture)[1]) / 3.0;
+    }
+    const DVec3 normal = glm::normalize(glm::cross(corner[1] - corner[0], corner[2] - corner[0]));
+    const VoxelType type = grid.get(voxel_of(at - normal * 0.5));
+    const Rgba8 expected = scene_.types[type].colour;
+    const auto x = static_cast<std::size_t>(uv.x * image.width);
+    const auto y = static_cast<std::size_t>((1.0 - uv.y) * image.height);
+    const std::uint8_t* const pixel = image.pixels.data() + 4 * (y * image.width + x);
+    ASSERT_EQ((Rgba8{pixel[0], pixel[1], pixel[2]}), (Rgba8{expected.r, expected.g, expected.b}));
+    ASSERT_EQ(alpha.pixels[4 * (y * image.width + x)], pixel[3]);
+    ASSERT_EQ(pixel[3] == 255, scene_.types[type].visibility == Visibility::Opaque);
+  }
+  EXPECT_EQ(materials.size(), 3U) << "opaque, cutout and translucent";
+}
+
 // Lowers the number of files that the process may open.
 class OpenFiles {
  public:

@@ -97,6 +97,21 @@ Status check_atlas(const Scene& scene, const std::vector<GridHandle>& grids, con
   return {};
 }
 
+/// Splits quads of textured types into the faces of voxels: in an atlas, their textures cannot repeat.
+void split_textured_quads(const VoxelRegistry& types, QuadBuffer& quads) {
+  QuadBuffer whole;
+  whole.swap(quads);
+  quads.reserve(whole.size());
+  for (const Quad& quad : whole) {
+    const bool is_textured = quad.type() < types.size() && !types[quad.type()].faces.empty();
+    const int step_u = is_textured ? 1 : quad.size_u();
+    const int step_v = is_textured ? 1 : quad.size_v();
+    for (int v = 0; v < quad.size_v(); v += step_v) {
+      for (int u = 0; u < quad.size_u(); u += step_u) quads.push_back(quad_part(quad, u, v, step_u, step_v));
+    }
+  }
+}
+
 /// Merges the opaque faces of the meshes across their occlusion, which is stored in the atlas of `meshes`. Returns the
 /// texture coordinates of each mesh.
 Result<std::vector<Coordinates>> move_into_atlas(const Scene& scene, const std::vector<GridHandle>& grids,
@@ -262,9 +277,14 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
     if (auto sound = check_atlas(scene, grids, options); !sound) return sound.error();
   }
   QUOIN_ASSERT(!options.atlas || !options.part_of, "an atlas needs completely loaded grids");
-  const double first_share = options.atlas ? 0.5 : 1.0;
+  const bool has_atlas = options.atlas && !scene.types.has_textures();
+  BlockySceneOptions wanted = options;
+  if (options.atlas && !has_atlas) {
+    wanted.cut = [&](GridHandle, IVec3, QuadBuffer& quads) { split_textured_quads(scene.types, quads); };
+  }
+  const double first_share = has_atlas ? 0.5 : 1.0;
   MeshResults results;
-  if (!options.part_of) results = mesh_all(scene, grids, options, threads, part_of(progress, 0.0, first_share));
+  if (!options.part_of) results = mesh_all(scene, grids, wanted, threads, part_of(progress, 0.0, first_share));
   for (const auto& result : results) {
     if (result && !*result) return result->error();
   }
@@ -272,7 +292,7 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
   SceneMeshes meshes;
   meshes.types = scene.types;
   std::vector<Coordinates> coordinates;
-  if (options.atlas) {
+  if (has_atlas) {
     auto moved = move_into_atlas(scene, grids, results, threads, part_of(progress, first_share, 1.0), meshes);
     if (!moved) return moved.error();
     coordinates = std::move(*moved);
