@@ -493,7 +493,7 @@ def check_edits(quoin, folder):
     far[0, 0, 0] = far[-1, -1, -1] = 1
     scene = quoin.from_numpy(far, [(9, 9, 9)])
     mesh = bpy.data.meshes.new("far")
-    require(not kept.keep(mesh, scene.grids[0], scene.types, 0.1, {}), "a box of two voxels")
+    require(not kept.keep(mesh, scene.grids[0], scene.types, 0.1, {}, [None] * len(scene.types)), "a box of two voxels")
 
 
 def check_many_types(quoin, folder):
@@ -620,6 +620,69 @@ def check_surfaces(path):
     require(group.nodes["Strength"].outputs[0].default_value == 0.5, "the occlusion's strength")
 
 
+def check_textures(quoin, folder):
+    """Textured faces have materials with images, which repeat per voxel, and an export keeps them."""
+    random = np.random.default_rng(3)
+    bark, leaf = (random.integers(0, 256, (16, 16, n), np.uint8) for n in (3, 4))
+    scene = quoin.from_numpy(np.array([1, 1, 1, 3, 0, 2], np.uint8).reshape(6, 1, 1),
+                             [(9, 9, 9), (9, 9, 9, 200), (200, 10, 20)])
+    side = quoin.Face(bark, "bark", turn=1, tint=(255, 128, 64))
+    scene.set_faces(1, [side] * 4 + [quoin.Face(bark, "bark"), side])
+    scene.set_faces(2, quoin.Face(leaf, "leaf", alpha="cutout"))
+    path = os.path.join(folder, "textures.json")
+    scene.save(path)
+    for palette in ("AUTO", "PALETTE"):
+        empty()
+        run(bpy.ops.import_scene.quoin, filepath=path, scale=1.0, materials=palette)
+        mesh, = bpy.data.meshes
+        textured = [one for one in mesh.materials if any(node.type == "UVMAP" for node in one.node_tree.nodes)]
+        require(len(textured) == 3 and len(mesh.materials) == 4, f"{len(mesh.materials)} materials")
+        faces = {}
+        for polygon in mesh.polygons:
+            material = mesh.materials[polygon.material_index]
+            if material not in textured:
+                continue
+            node = next(one for one in material.node_tree.nodes if one.type == "TEX_IMAGE")
+            require(node.interpolation == "Closest" and node.extension == "REPEAT" and node.image.packed_file, "image")
+            pixels = np.empty(16 * 16 * 4, np.float32)
+            node.image.pixels.foreach_get(pixels)
+            pixels = np.rint(255.0 * pixels).reshape(16, 16, 4)
+            uv = np.array([mesh.uv_layers["Texture"].data[i].uv for i in polygon.loop_indices])
+            at = np.array([mesh.vertices[mesh.loops[i].vertex_index].co for i in polygon.loop_indices])
+            if polygon.normal.y > -0.5 or node.image.name.startswith("leaf"):
+                faces[node.image.name.split(".")[0]] = material.blend_method
+                continue
+            # Towards the viewer, Quoin's +Z: each voxel shows the whole texture upright.
+            origin, ways = at[0], (at[1:] - at[0])[:, [0, 2]]
+            to_uv = np.linalg.lstsq(ways, uv[1:] - uv[0], rcond=None)[0]
+            for x in np.arange(0, 3, 1 / 16) + 1 / 32:
+                for z in np.arange(0, 1, 1 / 16) + 1 / 32:
+                    u, v = ((np.array([x, z]) - origin[[0, 2]]) @ to_uv + uv[0]) % 1.0
+                    found = pixels[int(v * 16), int(u * 16), :3]
+                    require((found == bark[int((1 - z) * 16), int(x * 16) % 16]).all(), f"the texel at {x}, {z}")
+            faces["front"] = True
+        require(faces == {"bark": "OPAQUE", "leaf": "CLIP", "front": True}, f"faces {faces}")
+        bpy.ops.wm.save_as_mainfile(filepath=os.path.join(folder, "textures.blend"))
+        bpy.ops.wm.open_mainfile(filepath=os.path.join(folder, "textures.blend"))
+        again = os.path.join(folder, "textures_again.json")
+        run(bpy.ops.export_scene.quoin, filepath=again, scale=1.0)
+        read = quoin.load(again)
+        types = {one.name: i for i, one in enumerate(read.types)}
+        kept = [read.textures().faces(i) for i in range(1, len(read.types))]
+        wanted = [scene.textures().faces(i) for i in range(1, len(scene.types))]
+        require(sum(one is not None for one in kept) == 2 and len(types) > 0, "textured types")
+        for six in wanted:
+            same = lambda a, b: a[1:6] == b[1:6] and np.array_equal(a.image, b.image)
+            require(six is None or any(other is not None and all(map(same, six, other)) for other in kept), "faces")
+    # Edited meshes are voxelized with the texels' colours.
+    mesh, = bpy.data.meshes
+    mesh.vertices[0].co.x += 0.001
+    run(bpy.ops.export_scene.quoin, filepath=again, scale=1.0)
+    colours = {tuple(one.rgba[:3]) for one in quoin.load(again).types[1:]}
+    texels = {tuple(int(v) for v in one) for one in (*bark.reshape(-1, 3), *leaf[..., :3].reshape(-1, 3))}
+    require(colours & texels, f"colours {colours}")
+
+
 def main():
     addon, castle, folder = sys.argv[sys.argv.index("--") + 1 :]
     bpy.ops.preferences.addon_install(filepath=addon)
@@ -652,6 +715,7 @@ def main():
     check_voxelized(quoin, folder)
     check_edits(quoin, folder)
     check_colours(quoin, folder)
+    check_textures(quoin, folder)
     check_refusals(folder)
     check_surfaces(castle)
     empty()

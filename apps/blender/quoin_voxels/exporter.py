@@ -1,5 +1,6 @@
 """Exports Blender objects to voxel files: imported voxels unchanged, other objects voxelized."""
 
+import hashlib
 import os
 
 import numpy as np
@@ -35,10 +36,12 @@ class _Writer:
         self._grids = {}  # by mesh and materials
         self._places = 0
 
-    def type_number(self, one):
-        key = tuple(one)
+    def type_number(self, one, faces=None):
+        key = (tuple(one), faces and tuple((hashlib.sha256(face.image).digest(), *face[1:6]) for face in faces))
         if key not in self._types:
             self._types[key] = self.scene.add_type(one)
+            if faces is not None:
+                self.scene.set_faces(self._types[key], faces)
         return self._types[key]
 
     def can_place(self, matrix):
@@ -66,7 +69,7 @@ class _Writer:
             types = [materials.edited(one, slots[slot]) if 0 <= slot < len(slots) else one
                      for one, slot in zip(found.types, found.slots)]
             self._warn_of_images(slots, {slot for slot in found.slots if slot >= 0}, name)
-            numbers = np.array([0] + [self.type_number(one) for one in types], np.uint16)
+            numbers = np.array([0] + [self.type_number(*one) for one in zip(types, found.faces)], np.uint16)
             grid = self.scene.add(numbers[found.voxels], name=mesh.name)
             # The array starts at `origin`; grids start at 0.
             moved = np.eye(4)
@@ -182,6 +185,9 @@ def _texels_of(mesh, node, triangles):
     """Samples a texture at triangle centres: sRGB bytes (n, 3), or None without a texture."""
     layer = mesh.uv_layers.active
     image = node.image if node.type == "TEX_IMAGE" else None
+    if image is not None and node.inputs["Vector"].is_linked:
+        source = node.inputs["Vector"].links[0].from_node
+        layer = mesh.uv_layers.get(source.uv_map, layer) if source.type == "UVMAP" else layer
     if image is None or layer is None or not image.size[0]:
         return None
     corners = np.empty((len(mesh.loop_triangles), 3), np.int32)

@@ -25,8 +25,13 @@ class Imported:
 class _Looks:
     """The materials of one import, created on first use."""
 
-    def __init__(self, name, types, options):
+    def __init__(self, name, scene, options):
+        types = scene.types
         self.name, self.types, self.scale = name, types, options.scale
+        self.textures = scene.textures()
+        self.faces = [self.textures.faces(i) for i in range(len(types))]
+        self.is_textured = np.array([one is not None for one in self.faces])
+        self._of_faces, self._images = {}, {}
         self.group = materials.occlusion_group(options.occlusion)
         is_palette = options.materials == "PALETTE" or (
             options.materials == "AUTO" and len(types) > materials.MOST_MATERIALS)
@@ -35,13 +40,29 @@ class _Looks:
         self._smooth = None
 
     def of(self, number):
-        """Returns a type's material."""
+        """Returns the material of a type, or of a textured face (see `number_of_faces`)."""
+        if number >= len(self.types):
+            return self._of_face(*divmod(number - len(self.types), 6))
         one = self.types[number]
         if self.palette is not None and not one.transparent:
             return self.palette.material
         if number not in self._of:
             self._of[number] = materials.of_type(one, number, self.group, self.scale)
         return self._of[number]
+
+    def number_of_faces(self, types, directions):
+        """Returns numbers for `of`: the types, and for textured types other numbers of their faces."""
+        return np.where(self.is_textured[types], len(self.types) + 6 * types + directions, types)
+
+    def _of_face(self, number, direction):
+        one, face = self.types[number], self.faces[number][direction]
+        key = (face.texture, face.image.shape, face.tint, face.alpha, one.emission, one.metalness, one.roughness)
+        if key not in self._of_faces:
+            image = key[:3]
+            if image not in self._images:
+                self._images[image] = materials.texture_image(face)
+            self._of_faces[key] = materials.of_face(one, face, self._images[image], self.group)
+        return self._of_faces[key]
 
     def has_own(self, number):
         return number in self._of
@@ -88,8 +109,15 @@ def _colours(mesh, name, values):
     layer.data.foreach_set("color", np.ascontiguousarray(values, np.float32).ravel())
 
 
+def _directions(normals):
+    """Returns the numbers of the directions of unit normals along axes: +X, -X, +Y, -Y, +Z, -Z."""
+    axis = np.abs(normals).argmax(1)
+    return 2 * axis + (normals[np.arange(len(normals)), axis] < 0.0)
+
+
 def _slots(mesh, looks, face_types, faces):
-    """Assigns materials to the mesh and its faces. Returns the slots of types that have their own material."""
+    """Assigns materials to the mesh and its faces, by their numbers in `looks`. Returns the slots of types that have
+    their own material."""
     occurs = np.flatnonzero(np.bincount(face_types, minlength=1))
     occurs = occurs[occurs > 0]
     slot_of = np.zeros(int(occurs.max(initial=0)) + 1, np.int32)
@@ -113,7 +141,7 @@ def _slots(mesh, looks, face_types, faces):
 def mesh_of(grid, name, looks, options):
     """Creates the Blender mesh of a grid, with attributes and materials. Returns it, or None if the grid has no
     surface; and the slots of types that have their own material."""
-    found = grid.mesh(smooth=options.surface == "SMOOTH")
+    found = grid.mesh(smooth=options.surface == "SMOOTH", textures=looks.textures)
     if not len(found.triangles):
         return None, {}
     blocks = 0 if found.types is None else int(np.count_nonzero(found.types))
@@ -140,12 +168,21 @@ def mesh_of(grid, name, looks, options):
         versions.shade_flat(mesh)
 
     face_types = np.zeros(0, np.int64) if blocks == 0 else found.types[:blocks:4].astype(np.int64)
-    slots = _slots(mesh, looks, face_types, faces)
+    face_looks = face_types
+    if found.textures is not None:
+        face_looks = looks.number_of_faces(face_types, _directions(found.normals[:blocks:4]))
+    slots = _slots(mesh, looks, face_looks, faces)
+    if found.textures is not None:
+        layer = mesh.uv_layers.new(name=materials.TEXTURE, do_init=False)
+        places = found.texture_uvs[corners]
+        places[:, 1] = 1.0 - places[:, 1]  # from the bottom
+        layer.data.foreach_set("uv", places.ravel())
     if looks.palette is not None and blocks:
         layer = mesh.uv_layers.new(name="Palette", do_init=False)
         places = np.zeros((len(corners), 2), np.float32)
         places[:len(quads) * 4] = np.repeat(looks.palette.places(face_types), 4, axis=0)
         layer.data.foreach_set("uv", places.ravel())
+        layer.active = layer.active_render = True  # the palette's material has no node for coordinates
     if len(rest):
         light = np.ones((len(found.positions), 4), np.float32)
         table = materials.linear(np.arange(256)).astype(np.float32)
@@ -162,7 +199,7 @@ def mesh_of(grid, name, looks, options):
 def _keep(mesh, grid, looks, slots, options, made):
     if not options.keep_voxels or not grid.voxel_count:
         return
-    if not kept.keep(mesh, grid, looks.types, options.scale, slots):
+    if not kept.keep(mesh, grid, looks.types, options.scale, slots, looks.faces):
         made.warnings.append(f"{mesh.name}: cannot keep the voxels in the .blend: too many or too scattered; export "
                              "will voxelize the mesh")
 
@@ -321,7 +358,7 @@ def import_file(context, path, options):
     top = bpy.data.collections.new(name)
     top[placements.FILE] = name
     context.scene.collection.children.link(top)
-    looks = _Looks(name, scene.types, options)
+    looks = _Looks(name, scene, options)
     if options.surface == "SMOOTH" and any(one.transparent or one.emission > 0.0 for one in looks.types):
         made.warnings.append(f"{name}: smooth surfaces are opaque and do not emit light; the file has transparent or "
                              "emissive types")

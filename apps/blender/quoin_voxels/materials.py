@@ -9,6 +9,7 @@ from . import quoin, versions
 
 OCCLUSION = "Occlusion"  # the light that reaches a vertex; 1: open
 COLOUR = "Colour"
+TEXTURE = "Texture"  # the coordinates of textured faces
 MOST_MATERIALS = 256
 _PALETTE, _MADE = "quoin_palette", "quoin_made"
 
@@ -92,14 +93,19 @@ def _scatter(material, one, scale):
     material.node_tree.links.new(volume.outputs[0], out.inputs["Volume"])
 
 
+def _set_surface(material, shader, one):
+    material.metallic, material.roughness = one.metalness, one.roughness
+    shader.inputs["Metallic"].default_value = one.metalness
+    shader.inputs["Roughness"].default_value = one.roughness
+
+
 def of_type(one, number, group, scale):
     """Creates the material of a type."""
     material, shader, occlusion = _new(one.name or f"voxel {number}", group)
     colour = linear(one.rgba[:3])
     occlusion.inputs[0].default_value = (*colour, 1.0)
     shader.inputs["Base Color"].default_value = (*colour, 1.0)
-    shader.inputs["Metallic"].default_value = one.metalness
-    shader.inputs["Roughness"].default_value = one.roughness
+    _set_surface(material, shader, one)
     if one.emission > 0.0:
         versions.input_of(shader, "Emission").default_value = (*colour, 1.0)
         shader.inputs["Emission Strength"].default_value = one.emission
@@ -113,18 +119,66 @@ def of_type(one, number, group, scale):
     if one.scattering > 0.0:
         _scatter(material, one, scale)
     material.diffuse_color = (*colour, max(alpha, 0.2))  # the colour in the solid viewport
-    material.metallic, material.roughness = one.metalness, one.roughness
     return material
 
 
-def _image(name, values, is_colour):
+def _packed(name, values, is_colour):
     height, width = values.shape[:2]
     image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=not is_colour, is_data=not is_colour)
     image.pixels.foreach_set(np.ascontiguousarray(values, np.float32).ravel())
     image.update()
     image.pack()
+    return image
+
+
+def _image(name, values, is_colour):
+    image = _packed(name, values, is_colour)
     image[_MADE] = zlib.compress(_pixels(image).tobytes())
     return image
+
+
+def texture_image(face):
+    """Creates the image of a face's texture, multiplied by its tint."""
+    texels = face.image.astype(np.float32) / 255.0
+    if tuple(face.tint) != (255, 255, 255):
+        texels[..., :3] = srgb(linear(face.image[..., :3]) * linear(face.tint)) / 255.0
+    image = _packed(face.name or "texture", texels[::-1], True)  # rows from the bottom
+    image.alpha_mode = "CHANNEL_PACKED"
+    return image
+
+
+def of_face(one, face, image, group):
+    """Creates the material of textured faces of a type, with the image of `texture_image`."""
+    material, shader, occlusion = _new(face.name or one.name or "texture", group)
+    _set_surface(material, shader, one)
+    tree = material.node_tree
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image, texture.interpolation = image, "Closest"
+    texture.location = (shader.location.x - 600, shader.location.y)
+    coordinates = tree.nodes.new("ShaderNodeUVMap")
+    coordinates.uv_map = TEXTURE
+    coordinates.location = (shader.location.x - 850, shader.location.y)
+    tree.nodes.active = texture
+    tree.links.new(coordinates.outputs[0], texture.inputs["Vector"])
+    tree.links.new(texture.outputs["Color"], occlusion.inputs[0])
+    if one.emission > 0.0:
+        tree.links.new(texture.outputs["Color"], versions.input_of(shader, "Emission"))
+        shader.inputs["Emission Strength"].default_value = one.emission
+    if face.alpha != "opaque":
+        alpha = texture.outputs["Alpha"]
+        if face.alpha == "cutout":  # a texel is visible from 128 of 255 on
+            limit = tree.nodes.new("ShaderNodeMath")
+            limit.operation = "GREATER_THAN"
+            limit.inputs[1].default_value = 0.5
+            limit.location = (shader.location.x - 250, shader.location.y - 250)
+            tree.links.new(alpha, limit.inputs[0])
+            alpha = limit.outputs[0]
+        tree.links.new(alpha, shader.inputs["Alpha"])
+        if hasattr(material, "blend_method"):
+            material.blend_method = "CLIP" if face.alpha == "cutout" else "BLEND"
+    mean = linear(face.image[..., :3]).reshape(-1, 3).mean(0) * linear(face.tint)
+    material.diffuse_color = (*mean, 1.0)
+    return material
 
 
 class Palette:
