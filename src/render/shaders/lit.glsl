@@ -29,15 +29,15 @@ uint texel_number(vec3 inside, uint axis, uint size) {
   return min(uint(max(0.0, along * float(size))), size - 1);
 }
 
-// Shows the nearest texel of a type's face, in the mipmap level that fits the distance of samples; does nothing if the
-// type has no textures. Matches render/light/lighting.h on the CPU. `inside`: the position in the voxel.
-// `square_spacing`: the square of the distance of samples there, in voxels; kMeanOfFace: shows the mean of the texture.
-void show_texture(uint type, uint face, vec3 inside, float square_spacing, inout Surface surface) {
-  uint number = Numbers(frame().texture_numbers).at[min(type, frame().last_surface)];
-  if (number == 0) return;
-  TexturedFaces faces = TexturedFaces(frame().textured_faces);
-  uvec4 what = faces.at[6 * (number - 1) + face].what;
-  vec4 tint = faces.at[6 * (number - 1) + face].tint;
+// Returns the number of a type's textured faces, from 1; 0 if it has none.
+uint textures_of(uint type) {
+  return Numbers(frame().texture_numbers).at[min(type, frame().last_surface)];
+}
+
+// Returns the colour of the nearest texel, without tint, in the mipmap level that fits the distance of samples; matches
+// render/light/lighting.h on the CPU. `what`: of a textured face. `inside`: the position in the voxel. `square_spacing`:
+// the square of the distance of samples there, in voxels; kMeanOfFace: the mean of the texture.
+vec3 texel_of(uvec4 what, vec3 inside, float square_spacing) {
   int last = int(what.z & 15);
   // log2 of the texels between samples, rounded: half the exponent of twice their square, plus that of the size.
   int exponent = int(floatBitsToUint(2.0 * square_spacing) >> 23) - 127;
@@ -47,8 +47,23 @@ void show_texture(uint type, uint face, vec3 inside, float square_spacing, inout
   // The levels before have size^2 * (1 + 1/4 + ...) texels.
   uint begin = ((4u << 2 * last) - (4u << 2 * log_size)) / 3;
   uint texel = Numbers(what.xy).at[begin + (row << log_size) + column];
-  surface.colour = linear_from_srgb(unpackUnorm4x8(texel).xyz) * tint.xyz;
+  return linear_from_srgb(unpackUnorm4x8(texel).xyz);
+}
+
+// Sets the colours of a surface with a texture. `tint`: of the textured face.
+void set_texel(vec3 texel, vec4 tint, inout Surface surface) {
+  surface.colour = texel * tint.xyz;
   surface.emitted = surface.colour * tint.w;
+}
+
+// Shows the texture of a type's face, as `texel_of`; does nothing if it has none.
+void show_texture(uint type, uint face, vec3 inside, float square_spacing, inout Surface surface) {
+  uint number = textures_of(type);
+  if (number == 0) return;
+  TexturedFaces faces = TexturedFaces(frame().textured_faces);
+  uvec4 what = faces.at[6 * (number - 1) + face].what;
+  vec4 tint = faces.at[6 * (number - 1) + face].tint;
+  set_texel(texel_of(what, inside, square_spacing), tint, surface);
 }
 
 // Returns true if an opaque type darkens corners.

@@ -10,29 +10,35 @@ layout(constant_id = 5) const uint kGlassStep = 0;  // draw mode, for the neares
 #include "mesh_light.glsl"
 #include "blocky_face.glsl"
 
+layout(location = 5) flat in uvec4 texels;
+layout(location = 6) flat in vec4 viewer;
+
 layout(location = 0) out vec4 pixel;
 
-// Returns the surface at the fragment, with its texture.
-Surface surface_seen() {
-  Surface surface = surface_of(uint(base.w));
-  if (!kHasTextures) return surface;
+// Returns the texel at the fragment, without tint.
+vec3 texel_seen() {
   vec3 at = before_face(what.x, 0.0);
   vec3 behind = at;
   behind[axis_of(what.x)] -= 0.5 * sign_of(what.x);
-  MeshFrame f = mesh_frame();
-  vec4 axis = f.instances[what.y].axes[0];
-  vec4 eye = f.instances[what.y].eye;
-  ivec4 home = f.instances[what.y].home;
-  vec3 away = at + vec3(base.xyz - home.xyz) - eye.xyz;
-  float square_spacing = axis.w * axis.w * (eye.w != 0.0 ? dot(away, away) : 1.0);
-  show_texture(uint(base.w), what.x, at - floor(behind), square_spacing, surface);
-  return surface;
+  vec3 away = at - viewer.xyz;
+  float square_spacing = viewer.w * viewer.w * (viewer.w > 0.0 ? dot(away, away) : 1.0);
+  return texel_of(texels, at - floor(behind), square_spacing);
 }
 
 void main() {
   if (kGlassStep != 0 && is_beyond(what.x)) discard;
   vec4 seen = colour;
-  if (kTraces || kHasTextures) seen = colour_of_face(what.x, surface_seen(), what.y, light_of(what.x), place.w);
+  bool is_textured = kHasTextures && texels.w != 0;
+  if (kTraces) {
+    Surface surface = surface_of(uint(base.w));
+    if (is_textured) {
+      vec4 tint = TexturedFaces(frame().textured_faces).at[texels.w - 1].tint;
+      set_texel(texel_seen(), tint, surface);
+    }
+    seen = colour_of_face(what.x, surface, what.y, light_of(what.x), place.w);
+  } else if (is_textured) {
+    seen.xyz *= texel_seen();
+  }
   // Alpha between opaque corners can fall below 1: values beyond a triangle's edge are extrapolated.
   pixel = vec4(shown(seen.xyz), kIsGlass ? seen.w : 1.0);
 }

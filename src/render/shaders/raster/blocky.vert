@@ -5,6 +5,25 @@
 // true: quads of many chunks, in the order stored in memory; false: one chunk's quads.
 layout(constant_id = 0) const bool kIsOrdered = false;
 
+// Read once per corner, since reading them per fragment would take most of the time of an image.
+layout(location = 5) flat out uvec4 texels;  // of the textured face; w: its number, from 1; 0: the face has no texture
+layout(location = 6) flat out vec4 viewer;   // the camera, in voxels from `base`; w: as in the instance, and negative for
+                                             // an orthographic camera
+
+void put_texture(uint face, uint type, uint instance) {
+  texels = uvec4(0);
+  viewer = vec4(0.0);
+  if (!kHasTextures) return;
+  uint number = textures_of(type);
+  if (number == 0) return;
+  uvec4 of_face = TexturedFaces(frame().textured_faces).at[6 * (number - 1) + face].what;
+  texels = uvec4(of_face.xyz, 6 * (number - 1) + face + 1);
+  vec4 axis = mesh_frame().instances[instance].axes[0];
+  vec4 eye = mesh_frame().instances[instance].eye;
+  ivec4 home = mesh_frame().instances[instance].home;
+  viewer = vec4(eye.xyz - vec3(base.xyz - home.xyz), eye.w != 0.0 ? axis.w : -axis.w);
+}
+
 void main() {
   uint index = uint(gl_VertexIndex);
   uint number = index >> 2;
@@ -46,9 +65,12 @@ void main() {
   vec3 widened;
   if (!put_corner(seen, face, point, is_east, is_north, widened)) {
     hide_corner();
+    texels = uvec4(0);
+    viewer = vec4(0.0);
     return;
   }
   ivec4 home = mesh_frame().instances[placed].home;
   put_face(face, bits.y >> 10 & 0xFFFF, placed, local + widened, low, high, home.xyz + ivec3(offset),
            openness_of(bits.x >> 30 | (bits.y & 63) << 2, corner));
+  put_texture(face, bits.y >> 10 & 0xFFFF, placed);
 }

@@ -68,9 +68,9 @@ bool find_face() {
   vec4 levels = vec4(corners & 3, corners >> 2 & 3, corners >> 4 & 3, corners >> 6 & 3);
   place = vec4(on, 1.0 - occlusion_at(levels, face, on) / 3.0);
   colour = vec4(0.0);
-  if (!kTraces && !kHasTextures) {
+  if (!kTraces) {
     vec3 sunlight = sunlight_of(diffuse_of(face, push.instance));
-    colour = colour_of_face(face, surface_of(uint(base.w)), push.instance, sunlight, place.w);
+    colour = colour_of_face(face, surface_of_face(uint(base.w), face), push.instance, sunlight, place.w);
   }
   return true;
 }
@@ -85,7 +85,7 @@ void main() {
   gl_FragDepth = gl_FragCoord.z;
   if ((push.numbers >> 29 & 1) != 0 && !find_face()) discard;
   vec4 seen = colour;
-  if (kTraces || kHasTextures) {
+  if (kTraces) {
     Surface surface = surface_of_face(uint(base.w), what.x);
     seen = colour_of_face(what.x, surface, what.y, light_of(what.x), place.w);
   }

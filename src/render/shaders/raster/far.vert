@@ -1,5 +1,6 @@
 #version 460
 // A corner of an impostor's rectangle, lit as one voxel's face.
+#define IS_IMPOSTOR
 #include "quad.glsl"
 #include "far.glsl"
 

@@ -1,5 +1,6 @@
-// Shared by blocky.vert and far.vert: corners of faces, and their outputs for fragments. Without traced light and
-// textures the output is the colour, which is linear in the openness.
+// Shared by blocky.vert and far.vert, which defines IS_IMPOSTOR: corners of faces, and their outputs for fragments.
+// Without traced light the output is the colour, which is linear in the openness. Fragments with textures multiply it by
+// their texels, because it is linear in the colour of the surface, too.
 #include "mesh.glsl"
 
 layout(constant_id = 1) const bool kIsGlass = false;
@@ -57,6 +58,21 @@ float openness_of(uint corners, uint corner) {
   return 1.0 - float(corners >> 2 * corner & 3) / 3.0;
 }
 
+// Returns the surface of a face, in the colour that its fragments do not change.
+Surface surface_at_corner(uint face, uint type) {
+  Surface surface = surface_of(type);
+  if (!kHasTextures) return surface;
+#ifdef IS_IMPOSTOR
+  show_texture(type, face, vec3(0.0), kMeanOfFace, surface);
+#else
+  uint number = textures_of(type);
+  if (number == 0) return surface;
+  vec4 tint = TexturedFaces(frame().textured_faces).at[6 * (number - 1) + face].tint;
+  set_texel(vec3(1.0), tint, surface);
+#endif
+  return surface;
+}
+
 // Writes the outputs for fragments. `local`: the corner. `low` and `high`: of the whole face, relative to `from`.
 void put_face(uint face, uint type, uint instance, vec3 local, vec3 low, vec3 high, ivec3 from, float openness) {
   int u = kFaceU[face];
@@ -66,6 +82,7 @@ void put_face(uint face, uint type, uint instance, vec3 local, vec3 low, vec3 hi
   edges = vec4(low[u], low[v], high[u], high[v]);
   what = uvec2(face, instance);
   colour = vec4(0.0);
-  if (kTraces || kHasTextures) return;
-  colour = colour_of_face(face, surface_of(type), instance, sunlight_of(diffuse_of(face, instance)), openness);
+  if (kTraces) return;
+  Surface surface = surface_at_corner(face, type);
+  colour = colour_of_face(face, surface, instance, sunlight_of(diffuse_of(face, instance)), openness);
 }
