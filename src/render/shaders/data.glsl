@@ -141,9 +141,9 @@ layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer Flo
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Vectors {
   vec4 at[];
 };
-// A face of a type: the address of its texels, of all mipmap levels, level 0 first; then log2 of the texels per side in
-// bits 0-3, and for the texture's rows (bits 4-6) and columns (8-10) the axis of the grid, and 4 if they run against it.
-// `tint`: in linear light; w: the emission.
+// A face of a type: the address of its texels, of all mipmap levels, level 0 first. Then in bits 0-3 log2 of the texels
+// per side; and for the texture's rows (bits 4-6) and columns (8-10) the axis of the grid, plus 4 if they run against
+// it. `tint`: in linear light; w: the emission.
 struct TexturedFace {
   uvec4 what;
   vec4 tint;
@@ -254,7 +254,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   uint lamp_mask;  // for slots of bricks
   uint light_mask;  // for slots of light-level bricks
   uvec2 paths;  // for path tracing: paths/path_data.glsl
-  uvec2 texture_numbers;  // of each type: of its six textured faces, from 1; 0: none. The last is for types out of range
+  uvec2 texture_numbers;  // a number per type, from 1: of its six textured faces; 0: none; the last: types out of range
   uvec2 textured_faces;
 };
 

@@ -35,8 +35,8 @@ uint textures_of(uint type) {
 }
 
 // Returns the colour of the nearest texel, without tint, in the mipmap level that fits the distance of samples; matches
-// render/light/lighting.h on the CPU. `what`: of a textured face. `inside`: the position in the voxel. `square_spacing`:
-// the square of the distance of samples there, in voxels; kMeanOfFace: the mean of the texture.
+// render/light/lighting.h on the CPU. `what`: of a textured face. `inside`: the position in the voxel.
+// `square_spacing`: the square of the distance of samples there, in voxels; kMeanOfFace: the mean of the texture.
 vec3 texel_of(uvec4 what, vec3 inside, float square_spacing) {
   int last = int(what.z & 15);
   // log2 of the texels between samples, rounded: half the exponent of twice their square, plus that of the size.

@@ -7,8 +7,8 @@ layout(constant_id = 0) const bool kIsOrdered = false;
 
 // Read once per corner, since reading them per fragment would take most of the time of an image.
 layout(location = 5) flat out uvec4 texels;  // of the textured face; w: its number, from 1; 0: the face has no texture
-layout(location = 6) flat out vec4 viewer;   // the camera, in voxels from `base`; w: as in the instance, and negative for
-                                             // an orthographic camera
+layout(location = 6) flat out vec4 viewer;   // the camera, in voxels from `base`; w: the distance of samples, as in
+                                             // MeshInstance, negative for an orthographic camera
 
 void put_texture(uint face, uint type, uint instance) {
   texels = uvec4(0);

@@ -1,6 +1,6 @@
 // Shared by blocky.vert and far.vert, which defines IS_IMPOSTOR: corners of faces, and their outputs for fragments.
-// Without traced light the output is the colour, which is linear in the openness. Fragments with textures multiply it by
-// their texels, because it is linear in the colour of the surface, too.
+// Without traced light the output is the colour, which is linear in the openness. Fragments with textures multiply it
+// by their texels, because it is linear in the colour of the surface, too.
 #include "mesh.glsl"
 
 layout(constant_id = 1) const bool kIsGlass = false;
