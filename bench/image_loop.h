@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <random>
 
 #include <benchmark/benchmark.h>
 
@@ -10,6 +11,21 @@
 #include "bench/image_workload.h"
 
 namespace quoin::workloads {
+
+/// Gives each type of a scene a texture of 64 x 64 texels.
+inline Scene textured(Scene scene) {
+  std::mt19937 random(1);
+  for (std::size_t i = 1; i < scene.types.size(); ++i) {
+    AlphaImage noise{64, 64, {}};
+    for (int k = 0; k < 4 * 64 * 64; ++k) {
+      noise.rgba.push_back(k % 4 == 3 ? 255 : static_cast<std::uint8_t>(random()));
+    }
+    VoxelProperties type = scene.types[static_cast<VoxelType>(i)];
+    type.faces = Texture::from_image(type.name, noise).value();
+    scene.types.replace(static_cast<VoxelType>(i), type);
+  }
+  return scene;
+}
 
 /// Times the benchmarks' image, rendered by `render(camera, options)`, and counts its rays.
 template <class Render>

@@ -1,7 +1,5 @@
 // render/terrain/1280x720: the 256x128x256 terrain with shadows and nine occlusion rays per hit, one thread.
 
-#include <random>
-
 #include <benchmark/benchmark.h>
 
 #include <quoin/render/cpu_renderer.h>
@@ -13,24 +11,9 @@ namespace {
 
 using workloads::fail_unless;
 
-// Gives each type of a scene a texture of 64 x 64 texels.
-Scene textured(Scene scene) {
-  std::mt19937 random(1);
-  for (std::size_t i = 1; i < scene.types.size(); ++i) {
-    AlphaImage noise{64, 64, {}};
-    for (int k = 0; k < 4 * 64 * 64; ++k) {
-      noise.rgba.push_back(k % 4 == 3 ? 255 : static_cast<std::uint8_t>(random()));
-    }
-    VoxelProperties type = scene.types[static_cast<VoxelType>(i)];
-    type.faces = Texture::from_image(type.name, noise).value();
-    scene.types.replace(static_cast<VoxelType>(i), type);
-  }
-  return scene;
-}
-
 void image(benchmark::State& state, const LightOptions& light, Threads threads = {1}, bool with_textures = false) {
   static const Scene plain = workloads::image_scene();
-  static const Scene with = textured(workloads::image_scene());
+  static const Scene with = workloads::textured(workloads::image_scene());
   const Scene& scene = with_textures ? with : plain;
   fail_unless(scene.voxel_count() == workloads::kImageVoxels, "the number of voxels", scene.voxel_count());
   const CpuRenderer renderer(scene, InstanceFilter::Visible, {1});

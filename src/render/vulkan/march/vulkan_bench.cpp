@@ -1,6 +1,8 @@
 // render/terrain/1280x720/vulkan: the image of cpu_renderer_bench.cpp on the best device found, and the cost of editing
 // one voxel. Skipped without a device.
 
+#include <utility>
+
 #include <benchmark/benchmark.h>
 
 #include <quoin/render/vulkan_renderer.h>
@@ -12,8 +14,9 @@ namespace {
 
 using workloads::fail_unless;
 
-void image(benchmark::State& state, const LightOptions& light) {
-  const Scene scene = workloads::image_scene();
+void image(benchmark::State& state, const LightOptions& light, bool with_textures = false) {
+  Scene scene = workloads::image_scene();
+  if (with_textures) scene = workloads::textured(std::move(scene));
   auto renderer = VulkanRenderer::create();
   if (!renderer) return state.SkipWithError(renderer.error().message.c_str());
   fail_unless(renderer->update(scene).has_value(), "the update's success", 0);
@@ -32,6 +35,14 @@ void unlit(benchmark::State& state) {
   LightOptions light;
   light.shading = Shading::Unlit;
   image(state, light);
+}
+void unlit_textures(benchmark::State& state) {
+  LightOptions light;
+  light.shading = Shading::Unlit;
+  image(state, light, true);
+}
+void full_textures(benchmark::State& state) {
+  image(state, {}, true);
 }
 void vertex(benchmark::State& state) {
   LightOptions light;
@@ -58,6 +69,16 @@ void update(benchmark::State& state) {
 BENCHMARK(full)->Name("render/terrain/1280x720/vulkan")->Unit(benchmark::kMillisecond)->Iterations(3)->UseRealTime();
 BENCHMARK(unlit)
     ->Name("render/terrain/1280x720/unlit/vulkan")
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(3)
+    ->UseRealTime();
+BENCHMARK(full_textures)
+    ->Name("render/terrain/1280x720/textures/vulkan")
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(3)
+    ->UseRealTime();
+BENCHMARK(unlit_textures)
+    ->Name("render/terrain/1280x720/unlit/textures/vulkan")
     ->Unit(benchmark::kMillisecond)
     ->Iterations(3)
     ->UseRealTime();

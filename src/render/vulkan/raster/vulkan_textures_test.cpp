@@ -6,6 +6,7 @@
 
 #include <glm/gtc/quaternion.hpp>
 
+#include "core/work/nightly_for_tests.h"
 #include "render/vulkan/march/renderer_impl.h"
 #include "render/vulkan/raster/mesh_for_tests.h"
 
@@ -73,8 +74,8 @@ class VulkanTextures : public vulkan_test::VulkanMeshTest {
     compare(scene, camera, with_mesh_light(options), name + "_lit");
     compare(scene, camera, without_shadows(options), name + "_plain");
   }
-  void compare_marched(const Scene& scene, const Camera& camera, const RenderOptions& options,
-                       const std::string& name) {
+  void compare_marched(const Scene& scene, const Camera& camera, const RenderOptions& whole, const std::string& name) {
+    const RenderOptions options = vulkan_test::of_day(whole);
     expect_equal(taken(scene, camera, options), render_test::taken(scene, camera, options), "textures_" + name);
   }
   /// Returns the number of textures in device memory.
@@ -192,6 +193,7 @@ TEST_F(VulkanTextures, InsideOfVoxelMatchesCpu) {
 }
 
 TEST_F(VulkanTextures, TexelsBehindGlassMatchCpu) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
   Scene scene;
   const Blocks blocks = add_blocks(scene);
   const VoxelType glass = add_type(scene, {120, 200, 230, 90}, Visibility::Transparent);
