@@ -343,15 +343,7 @@ std::vector<IVec3> ShapeIndex::update(const Grid& grid, const VoxelRegistry& typ
 }
 
 std::span<const PlacedShape> ShapeIndex::at(IVec3 voxel) const {
-  const auto found = chunks_.find(chunk_of(voxel));
-  if (found == chunks_.end()) return {};
-  const ChunkShapes& shapes = *found->second;
-  const IVec3 local = local_of(voxel);
-  const std::uint64_t row = shapes.touched[row_of(local)];
-  if ((row >> local.x & 1U) == 0) return {};
-  const std::uint64_t before = row & ((std::uint64_t{1} << local.x) - 1);
-  const std::size_t cell = shapes.first[row_of(local)] + static_cast<std::size_t>(std::popcount(before));
-  return std::span(shapes.shapes).subspan(shapes.starts[cell], shapes.starts[cell + 1] - shapes.starts[cell]);
+  return Reader(*this).at(voxel);
 }
 
 std::uint64_t ShapeIndex::touched_row(IVec3 voxel) const {

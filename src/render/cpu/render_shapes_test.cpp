@@ -157,20 +157,17 @@ TEST(RenderShapes, RaysAndShadowsPassCutoutTexels) {
   for (const float depth : image.depth.values) near += depth == 9.5F ? 1 : 0;
   EXPECT_EQ(near, 32 * 16);
   EXPECT_EQ(std::count(image.depth.values.begin(), image.depth.values.end(), 10.0F), 32 * 16);
-  // The shadow has the same form as the visible half: seen from below the plate.
+  // Rays to the sun look at the lower side of the plate, whose visible half is at +X.
   scene.environment = Environment{};
   scene.environment->sun.direction = {0.0, 1.0, 0.0};
   RenderOptions options = sized(32, 32);
   options.light.occlusion_mode = OcclusionMode::Off;
   const RenderedImage below = taken(scene, from_above(0.5, 0.4, 0.5, 1.0), options);
-  int agree = 0;
+  int wrong = 0;
   for (int y = 0; y < 32; ++y) {
-    for (int x = 0; x < 32; ++x) {
-      const bool is_shown = depth_at(image, x, y) == 9.5F;
-      agree += is_shown == (pixel_at(below, x, y)[0] < 128) ? 1 : 0;
-    }
+    for (int x = 0; x < 32; ++x) wrong += (pixel_at(below, x, y)[0] < 100) == (x >= 16) ? 0 : 1;
   }
-  EXPECT_EQ(agree, 32 * 32);
+  EXPECT_EQ(wrong, 0);
 }
 
 TEST(RenderShapes, PanesTintWhatIsBehind) {

@@ -396,6 +396,24 @@ void PathTile::note_part(Path& path, const Vertex& vertex, std::uint32_t surface
   path.part = kNoPart;
 }
 
+namespace {
+
+// The surface of a shape at a point of its grid: that of its type, with the colour of the texel of level 0.
+Surface surface_of_shape(const VoxelProperties& type, const Surfaces& surfaces, const ShapeHit& hit,
+                         const DVec3& point) {
+  Surface surface = surfaces[hit.type];
+  if (hit.face < 0 || hit.starts_inside) return surface;
+  const ModelFace& face = hit.model->faces[static_cast<std::size_t>(hit.face)];
+  const VoxelFace* const look = look_of(*hit.model, face, type.faces);
+  if (look == nullptr) return surface;
+  surface.colour = linear_colour(look->tint);
+  if (!look->texture.is_null()) surface.colour *= linear_colour(shape_texel(face, *look, point - DVec3(hit.voxel)));
+  surface.emitted = surface.colour * emission_of(type);
+  return surface;
+}
+
+}  // namespace
+
 void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane) {
   Path& path = paths_[index];
   const auto i = static_cast<std::size_t>(lane);
@@ -408,6 +426,7 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
   const IVec3 voxel{hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
   const Direction face = hits.grids.face[i];
   const bool in_field = (hits.in_field >> lane & 1U) != 0;
+  const bool in_shape = (hits.in_shape >> lane & 1U) != 0;
   const Ray ray = rays.ray(lane);
   vertex.in_grid = context_->view->grid_from_view(vertex.placed).point(ray.origin + ray.direction * hits.grids.t[i]);
   VoxelType type = hits.material[i];
@@ -421,6 +440,13 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
     surface = starts_inside
                   ? context_->surfaces->of_field(type)
                   : context_->surfaces->blend_of_field(placed.opaque_field->field(), voxel, inside, type, textured);
+    vertex.in_grid += normal * kRayLift;
+    vertex.normal = glm::normalize(Vec3(placed.world_axes * normal));
+  } else if (in_shape) {
+    const ShapeHit& hit = hits.shapes[i];
+    type = hit.type;
+    surface = surface_of_shape(context_->view->tracer().scene().types[type], *context_->surfaces, hit, vertex.in_grid);
+    const DVec3 normal(hit.normal);
     vertex.in_grid += normal * kRayLift;
     vertex.normal = glm::normalize(Vec3(placed.world_axes * normal));
   } else {
@@ -452,8 +478,9 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
     note_part(path, vertex, surface_id(voxel, face, in_field, vertex.placed, is_matte ? kAir : type), in_field);
   }
   note_layers(path, vertex, hits.grids.t[i], type);
-  if (!is_black(surface.emitted)) {
-    const std::int32_t lamp = in_field ? -1 : context_->lamps->lamp_of(vertex.placed, voxel, face);
+  // The lamps stand for cubes: of a shape, they give all light that paths between surfaces could find.
+  if (!is_black(surface.emitted) && (!in_shape || path.is_seen || light_.lamps == nullptr)) {
+    const std::int32_t lamp = in_field || in_shape ? -1 : context_->lamps->lamp_of(vertex.placed, voxel, face);
     add_emitted(path, surface.emitted, lamp, static_cast<float>(hits.grids.t[i]));
   }
 }

@@ -236,7 +236,7 @@ void PathTile::hit_glass(std::uint32_t index, const GlassBody& body, const DVec3
   const PlacedGrid& placed = context_->placed[static_cast<std::size_t>(body.placed)];
   vertex.in_grid =
       context_->view->grid_from_view(body.placed).point(path.origin + DVec3(path.direction) * body.t_enter);
-  if (!body.in_field) vertex.in_grid = on_face(vertex.in_grid, body.voxel, body.face);
+  if (!body.in_field && body.model == nullptr) vertex.in_grid = on_face(vertex.in_grid, body.voxel, body.face);
   vertex.in_grid += normal_in_grid * kRayLift;
   vertex.normal = glm::normalize(Vec3(placed.world_axes * normal_in_grid));
   vertex.in_view = context_->view->view_from_grid(body.placed).point(vertex.in_grid);

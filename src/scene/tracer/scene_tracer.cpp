@@ -86,7 +86,7 @@ std::size_t SceneTracer::bytes() const {
   for (const PlacedGrid& placed : impl_of(impl_).placed) {
     trees.insert({placed.opaque, placed.transparent});
     if (placed.shapes != nullptr) {
-      trees.insert(&placed.shapes->touched);
+      trees.insert({&placed.shapes->touched, &placed.shapes->solid, &placed.shapes->glass});
       indices.insert(&placed.shapes->index);
     }
     add_cells(placed.field);

@@ -106,7 +106,7 @@ struct TwoCubes {
 
 TEST(SceneUpdate, ShapesFollowEditsStatesAndTypes) {
   TracerCounts counts;
-  for (unsigned seed = 0; seed < static_cast<unsigned>(cases(12, 40)); ++seed) {
+  for (unsigned seed = 0; seed < static_cast<unsigned>(cases(4, 40)); ++seed) {
     SCOPED_TRACE(seed);
     ChangingScene world(seed, false, true);
     SceneTracer tracer(world.scene, InstanceFilter::Visible, {1});
@@ -129,7 +129,7 @@ TEST(SceneUpdate, ShapesFollowEditsStatesAndTypes) {
     }
   }
   EXPECT_GT(counts.hits, 100);
-  EXPECT_GT(counts.shapes, 300);
+  EXPECT_GT(counts.shapes, 100);
 }
 
 TEST(SceneUpdate, OnlyGridsWithShapesHaveIndex) {

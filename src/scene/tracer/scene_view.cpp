@@ -158,7 +158,9 @@ struct SceneView::Impl {
   // Returns false if an update of the tracer added or removed placed grids, which invalidates the view.
   [[nodiscard]] bool is_current() const { return placed_in(*tracer).size() == grid_from_view.size(); }
 
-  void take_nearer(std::size_t placed, const PacketHits& found, RayPacket& rays, SceneHits& hits) const {
+  // Takes the hits that are nearer than those known. Returns their lanes.
+  std::uint32_t take_nearer(std::size_t placed, const PacketHits& found, RayPacket& rays, SceneHits& hits) const {
+    std::uint32_t taken = 0;
     for (std::uint32_t left = found.hit; left != 0; left &= left - 1) {
       const int lane = std::countr_zero(left);
       const auto i = static_cast<std::size_t>(lane);
@@ -177,7 +179,9 @@ struct SceneView::Impl {
       hits.in_field &= ~bit;
       hits.in_shape &= ~bit;
       rays.max_t[i] = found.t[i];
+      taken |= bit;
     }
+    return taken;
   }
 
   // Finds the first hits in the only instance of the scene.
@@ -187,14 +191,18 @@ struct SceneView::Impl {
     RoomFor<RayPacket> room_for_rays;
     RayPacket& rays = *room_for_rays;
     move(grid_from_view.front(), rays_in_view, rays);
-    if (has_opaque(placed)) quoin::first_hits(*placed.opaque, rays, hits.grids);
+    if (placed.shapes != nullptr) {
+      hits.in_shape =
+          first_solids(*placed.shapes, *placed.opaque, tracer->scene().types, rays, hits.grids, hits.shapes);
+    } else if (has_opaque(placed)) {
+      quoin::first_hits(*placed.opaque, rays, hits.grids);
+    }
     hits.placed.fill(0);
-    if (placed.opaque_field == nullptr && placed.shapes == nullptr) return;
+    if (placed.opaque_field == nullptr) return;
     for (std::size_t i = 0; i < kLanes; ++i) {
       if ((hits.grids.hit >> i & 1U) != 0) rays.max_t[i] = hits.grids.t[i];
     }
-    if (placed.shapes != nullptr) (void)add_shapes(placed, 0, rays, hits);
-    if (placed.opaque_field != nullptr) (void)add_field(placed, 0, rays, hits);
+    (void)add_field(placed, 0, rays, hits);
   }
 
   // Finds hits of the lanes `near` in an instance that are nearer than those in `hits`. Lowers the max_t of these rays.
@@ -207,53 +215,33 @@ struct SceneView::Impl {
     move(grid_from_view[index], left, rays);
     rays.active = near;
     std::uint32_t met = 0;
-    if (has_opaque(placed)) {
-      RoomFor<PacketHits> room_for_hits;
-      PacketHits& found = *room_for_hits;
+    RoomFor<PacketHits> room_for_hits;
+    PacketHits& found = *room_for_hits;
+    if (placed.shapes != nullptr) {
+      RoomFor<RayPacket::Lanes<ShapeHit>> room_for_shapes;
+      RayPacket::Lanes<ShapeHit>& shapes = *room_for_shapes;
+      const std::uint32_t in_shape =
+          first_solids(*placed.shapes, *placed.opaque, tracer->scene().types, rays, found, shapes);
+      met = found.hit;
+      const std::uint32_t taken = take_nearer(index, found, left, hits) & in_shape;
+      hits.in_shape |= taken;
+      for (std::uint32_t each = taken; each != 0; each &= each - 1) {
+        const auto lane = static_cast<std::size_t>(std::countr_zero(each));
+        hits.shapes[lane] = shapes[lane];
+      }
+    } else if (has_opaque(placed)) {
       quoin::first_hits(*placed.opaque, rays, found);
       met = found.hit;
       take_nearer(index, found, left, hits);
     }
-    if (placed.opaque_field == nullptr && placed.shapes == nullptr) return met;
+    if (placed.opaque_field == nullptr) return met;
     rays.max_t = left.max_t;
-    std::uint32_t taken = placed.shapes == nullptr ? 0 : add_shapes(placed, index, rays, hits);
-    if (placed.opaque_field != nullptr) taken |= add_field(placed, index, rays, hits);
+    const std::uint32_t taken = add_field(placed, index, rays, hits);
     for (std::uint32_t each = taken; each != 0; each &= each - 1) {
       const auto lane = static_cast<std::size_t>(std::countr_zero(each));
       left.max_t[lane] = hits.grids.t[lane];
     }
     return met | taken;
-  }
-
-  // Adds hits with shapes of a placed grid that are nearer than those in `hits`, or not farther than its own voxels. The
-  // rays are in the grid's space and limited to the known hits. Lowers the max_t of these rays. Returns the lanes with
-  // a new hit.
-  std::uint32_t add_shapes(const PlacedGrid& placed, std::size_t index, RayPacket& rays_in_grid,
-                           SceneHits& hits) const {
-    QUOIN_ASSERT(placed.shapes != nullptr, "a placed grid with shapes");
-    RoomFor<RayPacket::Lanes<ShapeHit>> room;
-    RayPacket::Lanes<ShapeHit>& found = *room;
-    std::uint32_t taken = 0;
-    const std::uint32_t met = first_shapes(*placed.shapes, tracer->scene().types, rays_in_grid, found);
-    for (std::uint32_t left = met; left != 0; left &= left - 1) {
-      const int lane = std::countr_zero(left);
-      const auto i = static_cast<std::size_t>(lane);
-      const std::uint32_t bit = 1U << lane;
-      const ShapeHit& hit = found[i];
-      const auto number = static_cast<std::int32_t>(index);
-      if ((hits.grids.hit & bit) != 0) {
-        if (hit.t > hits.grids.t[i] || (hit.t == hits.grids.t[i] && number > hits.placed[i])) continue;
-      }
-      hits.grids.starts_inside &= ~bit;
-      hits.grids.set(lane, {hit.voxel, hit.direction, hit.t, hit.starts_inside});
-      hits.placed[i] = number;
-      hits.shapes[i] = hit;
-      hits.in_shape |= bit;
-      hits.in_field &= ~bit;
-      rays_in_grid.max_t[i] = hit.t;
-      taken |= bit;
-    }
-    return taken;
   }
 
   // Adds hits with the opaque field of a placed grid that are nearer than those in `hits`. The rays are in the grid's

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include <glm/geometric.hpp>
@@ -145,17 +146,18 @@ bool is_visible_at(const VoxelProperties& type, const ShapeModel& model, const M
 // A ray on its way through the cells that shapes touch.
 class ShapeRay {
  public:
-  ShapeRay(const TracedShapes& shapes, const VoxelRegistry& types, const Ray& ray, double max_t, ShapeParts parts)
-      : shapes_(shapes), types_(types), ray_(ray), max_t_(max_t), parts_(parts) {
+  ShapeRay(const TracedShapes& shapes, const VoxelRegistry& types, ShapeIndex::Reader& reader, const Ray& ray,
+           double max_t, ShapeParts parts)
+      : shapes_(shapes), types_(types), reader_(reader), ray_(ray), max_t_(max_t), parts_(parts) {
     const DVec3 size = glm::abs(ray.direction);
     room_ = kBetweenCells / std::max(std::max(size.x, size.y), size.z);
   }
 
-  // Looks at one cell. Returns true if there is a hit, which is then the nearest one.
-  bool meet_cell(IVec3 cell, double t_enter, double t_exit) {
+  // Looks at the shapes of one cell. Returns true if there is a hit, which is then the nearest one.
+  bool meet_shapes(std::span<const PlacedShape> shapes, double t_enter, double t_exit) {
     begin_ = t_enter - room_;
     end_ = std::min(t_exit + room_, max_t_);
-    for (const PlacedShape& shape : shapes_.index.at(cell)) {
+    for (const PlacedShape& shape : shapes) {
       if (parts_ == ShapeParts::Opaque && types_[shape.type].visibility != Visibility::Opaque) continue;
       if (parts_ == ShapeParts::Colliding && !types_[shape.type].collides) continue;
       cross_shape(shape, ray_, [&](const ShapeSpan& span) {
@@ -166,24 +168,27 @@ class ShapeRay {
     return found_;
   }
 
-  // As above, for a cell that the ray enters at `t_enter`. Sets `t_exit`.
-  bool meet_cell_from(IVec3 cell, double t_enter, double& t_exit) {
-    t_exit = kFar;
+  struct CellExit {
+    double t = kFar;
+    Direction next_face = Direction::PosX;  // of the next cell
+  };
+  // Returns where the ray leaves a cell.
+  [[nodiscard]] CellExit exit_of(IVec3 cell) const {
+    CellExit exit;
     for (int axis = 0; axis < 3; ++axis) {
       const double d = ray_.direction[axis];
       if (d == 0.0) continue;
-      t_exit = std::min(t_exit, (cell[axis] + (d > 0.0 ? 1.0 : 0.0) - ray_.origin[axis]) / d);
+      const double t = (cell[axis] + (d > 0.0 ? 1.0 : 0.0) - ray_.origin[axis]) / d;
+      if (!(t < exit.t)) continue;
+      exit = {t, side_of(axis, d < 0.0)};
     }
-    return meet_cell(cell, t_enter, t_exit);
+    return exit;
   }
 
-  // Looks at all cells from `t_begin` on.
-  bool meet_rest(double t_begin) {
-    if (t_begin > max_t_) return false;
-    const Ray rest{ray_.origin + t_begin * ray_.direction, ray_.direction};
-    visit_hits(shapes_.touched, rest, max_t_ - t_begin, [&](const VoxelSpan& span) {
-      return !meet_cell(span.voxel, t_begin + span.t_enter, t_begin + span.t_exit);
-    });
+  // Looks at all cells.
+  bool meet_cells() {
+    visit_hits(shapes_.touched, ray_, max_t_,
+               [&](const VoxelSpan& span) { return !meet_shapes(reader_.at(span.voxel), span.t_enter, span.t_exit); });
     return found_;
   }
 
@@ -222,9 +227,7 @@ class ShapeRay {
                          point);
   }
   // Both sides of a plate are at one place: the ray meets the side that it looks at.
-  static bool is_seen_from_inside(const ShapeSpan& span) {
-    return span.enter.t < span.exit.t || span.enter.face < 0;
-  }
+  static bool is_seen_from_inside(const ShapeSpan& span) { return span.enter.t < span.exit.t || span.enter.face < 0; }
   void take_visible(const ShapeSpan& span) {
     const bool is_opaque = types_[span.shape->type].visibility == Visibility::Opaque;
     if (span.starts_inside() && is_opaque) {
@@ -242,6 +245,7 @@ class ShapeRay {
 
   const TracedShapes& shapes_;
   const VoxelRegistry& types_;
+  ShapeIndex::Reader& reader_;
   const Ray& ray_;
   double max_t_;
   ShapeParts parts_;
@@ -309,46 +313,81 @@ void visit_shape(const PlacedShape& shape, const Ray& ray_in_grid, FunctionRef<v
 
 bool first_shape(const TracedShapes& shapes, const VoxelRegistry& types, const Ray& ray_in_grid, double max_t,
                  ShapeParts parts, ShapeHit& hit) {
-  ShapeRay ray(shapes, types, ray_in_grid, max_t, parts);
-  if (!ray.meet_rest(0.0)) return false;
+  ShapeIndex::Reader reader(shapes.index);
+  ShapeRay ray(shapes, types, reader, ray_in_grid, max_t, parts);
+  if (!ray.meet_cells()) return false;
   hit = ray.hit();
   return true;
 }
 
 namespace {
 
-// Calls `visit(lane, ShapeRay&)` for each ray that meets a visible part of a shape.
-template <class Visit>
-void meet_lanes(const TracedShapes& shapes, const VoxelRegistry& types, const RayPacket& rays, const Visit& visit) {
-  PacketHits cells;
-  first_hits(shapes.touched, rays, cells);
-  for (std::uint32_t left = cells.hit; left != 0; left &= left - 1) {
-    const int lane = std::countr_zero(left);
-    const auto i = static_cast<std::size_t>(lane);
-    const Ray in_grid = rays.ray(lane);
-    ShapeRay ray(shapes, types, in_grid, rays.max_t[i], ShapeParts::Visible);
-    double t_exit = 0.0;
-    const bool is_met = ray.meet_cell_from({cells.x[i], cells.y[i], cells.z[i]}, cells.t[i], t_exit);
-    // The kernel and the exact walk may choose different cells next to an edge.
-    if (is_met || ray.meet_rest(std::max(cells.t[i], t_exit))) visit(lane, ray);
-  }
+// What a ray meets after the first cell: a shape (true), or an opaque voxel or nothing in `next`.
+bool meet_solid_behind(ShapeRay& ray, const TracedShapes& shapes, ShapeIndex::Reader& reader,
+                       const OccupancyTree& opaque, const Ray& in_grid, double max_t, const ShapeRay::CellExit& exit,
+                       std::optional<RayHit>& next) {
+  if (exit.t > max_t) return false;
+  const Ray rest{in_grid.origin + exit.t * in_grid.direction, in_grid.direction};
+  bool is_met = false;
+  visit_hits(shapes.solid, rest, max_t - exit.t, [&](const VoxelSpan& span) {
+    const std::span<const PlacedShape> here = reader.at(span.voxel);
+    const bool is_own = !here.empty() && here.front().voxel == span.voxel;
+    if (!is_own && (here.empty() || opaque.is_occupied(span.voxel))) {
+      const Direction face = span.starts_inside ? exit.next_face : span.face;
+      next = RayHit{span.voxel, face, exit.t + span.t_enter, false};
+      return false;
+    }
+    is_met = ray.meet_shapes(here, exit.t + span.t_enter, exit.t + span.t_exit);
+    return !is_met;
+  });
+  return is_met;
 }
 
 }  // namespace
 
-std::uint32_t first_shapes(const TracedShapes& shapes, const VoxelRegistry& types, const RayPacket& rays_in_grid,
-                           RayPacket::Lanes<ShapeHit>& hits) {
-  std::uint32_t met = 0;
-  meet_lanes(shapes, types, rays_in_grid, [&](int lane, const ShapeRay& ray) {
-    hits[static_cast<std::size_t>(lane)] = ray.hit();
-    met |= 1U << lane;
-  });
-  return met;
+std::uint32_t first_solids(const TracedShapes& shapes, const OccupancyTree& opaque, const VoxelRegistry& types,
+                           const RayPacket& rays_in_grid, PacketHits& hits, RayPacket::Lanes<ShapeHit>& in_shapes) {
+  first_hits(shapes.solid, rays_in_grid, hits);
+  ShapeIndex::Reader reader(shapes.index);
+  std::uint32_t in_shape = 0;
+  for (std::uint32_t left = hits.hit; left != 0; left &= left - 1) {
+    const int lane = std::countr_zero(left);
+    const auto i = static_cast<std::size_t>(lane);
+    const IVec3 cell{hits.x[i], hits.y[i], hits.z[i]};
+    const std::span<const PlacedShape> here = reader.at(cell);
+    if (here.empty()) continue;
+    if (here.front().voxel != cell && opaque.is_occupied(cell)) continue;
+    const Ray in_grid = rays_in_grid.ray(lane);
+    const double max_t = rays_in_grid.max_t[i];
+    ShapeRay ray(shapes, types, reader, in_grid, max_t, ShapeParts::Visible);
+    // The kernel and the exact walk may choose different cells next to an edge.
+    ShapeRay::CellExit exit = ray.exit_of(cell);
+    exit.t = std::max(exit.t, hits.t[i]);
+    std::optional<RayHit> next;
+    if (ray.meet_shapes(here, hits.t[i], exit.t) ||
+        meet_solid_behind(ray, shapes, reader, opaque, in_grid, max_t, exit, next)) {
+      const ShapeHit& hit = in_shapes[i] = ray.hit();
+      next = RayHit{hit.voxel, hit.direction, hit.t, hit.starts_inside};
+      in_shape |= 1U << lane;
+    }
+    const std::uint32_t bit = 1U << lane;
+    hits.hit &= ~bit;
+    hits.starts_inside &= ~bit;
+    if (next) hits.set(lane, *next);
+  }
+  return in_shape;
 }
 
 std::uint32_t any_shapes(const TracedShapes& shapes, const VoxelRegistry& types, const RayPacket& rays_in_grid) {
+  ShapeIndex::Reader reader(shapes.index);
   std::uint32_t met = 0;
-  meet_lanes(shapes, types, rays_in_grid, [&](int lane, const ShapeRay&) { met |= 1U << lane; });
+  for (std::uint32_t left = any_hits(shapes.touched, rays_in_grid); left != 0; left &= left - 1) {
+    const int lane = std::countr_zero(left);
+    const Ray in_grid = rays_in_grid.ray(lane);
+    ShapeRay ray(shapes, types, reader, in_grid, rays_in_grid.max_t[static_cast<std::size_t>(lane)],
+                 ShapeParts::Visible);
+    if (ray.meet_cells()) met |= 1U << lane;
+  }
   return met;
 }
 

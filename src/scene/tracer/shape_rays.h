@@ -82,9 +82,11 @@ enum class ShapeParts : std::uint8_t {
 bool first_shape(const TracedShapes& shapes, const VoxelRegistry& types, const Ray& ray_in_grid, double max_t,
                  ShapeParts parts, ShapeHit& hit);
 
-/// As `first_shape` for each active ray of a packet, with ShapeParts::Visible. Returns the lanes with a hit.
-std::uint32_t first_shapes(const TracedShapes& shapes, const VoxelRegistry& types, const RayPacket& rays_in_grid,
-                           RayPacket::Lanes<ShapeHit>& hits);
+/// Finds the nearest opaque voxel or visible part of a shape (ShapeParts::Visible) for each active ray of a packet. For
+/// shapes, the voxel of `hits` is that of the shape, and its face is ShapeHit::direction. Returns the lanes that hit
+/// shapes, with their entries in `in_shapes`. `opaque`: the tree of the grid's opaque voxels.
+std::uint32_t first_solids(const TracedShapes& shapes, const OccupancyTree& opaque, const VoxelRegistry& types,
+                           const RayPacket& rays_in_grid, PacketHits& hits, RayPacket::Lanes<ShapeHit>& in_shapes);
 /// Returns the rays that hit visible parts of shapes.
 [[nodiscard]] std::uint32_t any_shapes(const TracedShapes& shapes, const VoxelRegistry& types,
                                        const RayPacket& rays_in_grid);

@@ -9,6 +9,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/scene/scene_tracer.h>
 
+#include "core/coordinates/chunk_order.h"
 #include "mesh/surface/voxel_surface.h"
 #include "scene/tracer/placed_grid.h"
 #include "trace/chunk_rows.h"
@@ -71,6 +72,53 @@ std::uint64_t glass_row(const TracedShapes& shapes, IVec3 first) {
     if (std::ranges::any_of(shapes.index.at(first + IVec3(x, 0, 0)), is_glass)) row |= std::uint64_t{1} << x;
   }
   return row;
+}
+
+// Rows of the voxels that are opaque or that shapes touch. Remembers the rows around the last one.
+class OpaqueRows {
+ public:
+  OpaqueRows(const Grid& grid, const VoxelRegistry& types, const TracedShapes& shapes)
+      : grid_(grid), types_(types), shapes_(shapes) {}
+  std::uint64_t operator()(IVec3 first) {
+    const IVec3 chunk = chunk_of(first);
+    const IVec3 local = local_of(first);
+    if (!is_begun_ || chunk != chunk_) {
+      is_begun_ = true;
+      chunk_ = chunk;
+      slab_ = IVec3(-1);
+      rows_.reset();
+      if (const Chunk* const voxels = grid_.find_chunk(chunk)) rows_.emplace(*voxels, types_, Occupancy::Opaque);
+    }
+    if (!rows_) return shapes_.index.touched_row(first);
+    const IVec3 slab{0, local.y & ~3, local.z & ~3};
+    if (slab != slab_) {
+      slab_ = slab;
+      const trace::Slab kind = rows_->read(slab.y, slab.z, slab_rows_);
+      if (kind == trace::Slab::Empty) slab_rows_.fill(0);
+      if (kind == trace::Slab::Full) slab_rows_.fill(~std::uint64_t{0});
+    }
+    const std::uint64_t opaque = slab_rows_[static_cast<std::size_t>((local.y & 3) + 4 * (local.z & 3))];
+    return opaque | shapes_.index.touched_row(first);
+  }
+
+ private:
+  const Grid& grid_;
+  const VoxelRegistry& types_;
+  const TracedShapes& shapes_;
+  bool is_begun_ = false;
+  IVec3 chunk_{0};
+  IVec3 slab_{-1};
+  std::optional<trace::ChunkRows> rows_;  // of `chunk_`
+  trace::SlabRows slab_rows_{};
+};
+
+// Returns the chunks whose opaque or touched voxels may have changed: all chunks of a grid whose shapes are new.
+std::vector<IVec3> chunks_of_both(std::vector<IVec3> touched, const std::vector<IVec3>& changed, bool is_new,
+                                  const Grid& grid) {
+  const std::vector<IVec3> all = is_new ? grid.chunks() : changed;
+  touched.insert(touched.end(), all.begin(), all.end());
+  sort_and_unite(touched);
+  return touched;
 }
 
 // The voxel data of a grid, for PendingChanges.
@@ -144,6 +192,8 @@ bool TreeCache::update_shapes(const Grid& grid, const VoxelRegistry& types, cons
   const auto rows = [&](IVec3 first) { return shapes.index.touched_row(first); };
   shapes_->touched.update(changed, rows);
   shapes_->is_glass = glass_types(types);
+  OpaqueRows solid_rows(grid, types, shapes);
+  shapes_->solid.update(chunks_of_both(changed, changes.chunks(grid), is_new, grid), solid_rows);
   const auto glass_rows = [&](IVec3 first) { return glass_row(shapes, first); };
   if (!shapes_->is_glass.empty()) shapes_->glass.update(changed, glass_rows);
   if (shapes_->index.empty()) shapes_.reset();

@@ -64,6 +64,7 @@ class SplitField {
 struct TracedShapes {
   ShapeIndex index;
   OccupancyTree touched;  ///< the voxels that shapes touch, also air: their own, and those that they reach into
+  OccupancyTree solid;    ///< the same and all opaque voxels, so that a ray finds the first of both at once
   /// The voxels that shapes with glass touch: without textures or with translucent ones, of transparent types. Empty if
   /// there are none.
   OccupancyTree glass;
