@@ -39,9 +39,9 @@ enum class Accumulation : std::uint8_t {
 /// Renders the same images as CpuRenderer on a Vulkan device: its own device or the application's.
 ///
 /// Equal:    options and errors are as in CpuRenderer, except that OcclusionMode::Smooth is Unsupported. Channels
-///           differ by at most 2, except at silhouettes, where single precision can take a ray past another voxel. This
-///           affects less than one pixel in a thousand, unless whole rows of rays run exactly along voxel faces. Ray
-///           counts differ as little.
+///           differ by at most 2, except at silhouettes, where single precision can take a ray past another voxel, and
+///           at edges of texels. This affects less than one pixel in a thousand, unless whole rows of rays run exactly
+///           along voxel faces or edges of texels. Ray counts differ as little.
 /// Detail:   grids are halved and impostors built on the CPU on first use, from the scene of the last update. Images
 ///           with `DetailOptions::policy`, and the first image with lamps or propagated light, require that this scene
 ///           still exists unedited.
