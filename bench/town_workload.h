@@ -1,6 +1,6 @@
 #pragma once
 
-// A town of 9x9 chunks: hills, streets with fences, plants, steps and torches beside them, and houses. With shapes, or
+// A town of 9x9 chunks: hills, streets with fences, plants, steps and torches along them, and houses. With shapes, or
 // the same voxels as cubes.
 
 #include <algorithm>
@@ -66,7 +66,7 @@ inline int town_height(int x, int z) {
   return 24 + static_cast<int>(std::lround(6.0 * std::sin(x / 41.0) + 5.0 * std::cos(z / 33.0)));
 }
 
-// Places what stands beside a street: nothing in 60 % of the places.
+// Places a block next to a street, in 40 % of the places.
 inline void place_beside_street(Grid& grid, const TownTypes& types, IVec3 at) {
   const std::uint32_t number = town_number(at.x, at.z, 1'000);
   if (number >= 400) return;

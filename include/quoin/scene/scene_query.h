@@ -45,9 +45,9 @@ struct QueryFilter {
 /// A ray hit in a scene.
 struct SceneHit {
   InstanceHandle instance;
-  /// Voxel in the traced grid: the instance's grid, unless the tracer uses a halved one. For a shape, the voxel that has
-  /// it, although the hit may lie outside: a shape reaches up to a voxel beyond its own. For a field, the cell as in
-  /// DensityHit.
+  /// Voxel in the traced grid: the instance's grid, unless the tracer uses a halved one. For a shape, the voxel
+  /// that has it, although the hit may lie outside: a shape reaches up to a voxel beyond its own. For a field, the cell
+  /// as in DensityHit.
   IVec3 voxel{0};
   VoxelType type = kAir;  ///< for a field, the material
   /// Face of the voxel, in its grid, as in RayHit; for a shape or a field, the direction nearest to its normal.
@@ -72,9 +72,9 @@ struct SceneHit {
 /// or NaN.
 ///
 /// Shapes:    a voxel with a shape (VoxelProperties::shapes) consists of the shape's elements, with drawn sides or
-///            without, whatever their textures show: a ray meets the wooden frame and the panes of a window. With
-///            QueryTypes::Colliding, elements with `collides = false` are air; with QueryTypes::Opaque, all elements of
-///            types whose `visibility` is Transparent. Halved grids have cubes in place of shapes.
+///            without, also where their textures are transparent: a ray meets the frame and the panes of a window.
+///            With QueryTypes::Colliding, elements with `collides = false` are air; with QueryTypes::Opaque, all
+///            elements of types whose `visibility` is Transparent. Halved grids have cubes in place of shapes.
 /// Precision: the ray is transformed into each grid in double, so at 10^9 from the origin a hit is as exact as the ray.
 /// Filters:   excluded voxels and instances count as air; a ray that starts inside them starts in air.
 /// Partial:   with UnloadedChunks::Block, a hit is certain or reports the entry into unloaded space, and a miss

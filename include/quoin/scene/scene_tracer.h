@@ -29,7 +29,8 @@ class SceneTracer {
   ~SceneTracer();
 
   /// Applies all changes of the scene: instances that were added, removed, moved, shown or hidden; grids that were
-  /// added, removed, edited or replaced; types whose transparency changed. The result equals a newly built tracer.
+  /// added, removed, edited or replaced, also states that select shapes; types whose transparency or shapes changed.
+  /// The result equals a newly built tracer.
   /// Returns true if a traced grid or the transparency of its types changed; data derived from them is then out of
   /// date.
   ///
@@ -66,9 +67,10 @@ class SceneTracer {
 
   /// Returns the traced scene, whose registry defines the types that collide.
   [[nodiscard]] const Scene& scene() const;
-  /// Returns true if any instance has transparent voxels or transparent material in its field.
+  /// Returns true if any instance has transparent voxels, transparent parts of shapes or transparent material in its
+  /// field.
   [[nodiscard]] bool has_transparent() const;
-  /// Returns the bytes of all traced voxel and field trees; shared trees count once.
+  /// Returns the bytes of all traced voxel and field trees, and of the lists of shapes; shared ones count once.
   [[nodiscard]] std::size_t bytes() const;
 
   // For Quoin's own sources.

@@ -71,7 +71,7 @@ class Tile {
   void take_sample(int sample);
   void take_block(int x, int y, const RayPacket& rays, int sample);
   [[nodiscard]] std::uint32_t lanes_through_glass(const RayPacket& rays, const SceneHits& hits) const;
-  static void put_on_shape(const ShapeModel& model, const ModelFace& face, const Vec3& normal, SurfacePoint& point);
+  static void put_on_shape(const ShapeModel& model, std::int16_t face, const Vec3& normal, SurfacePoint& point);
   void add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight);
   // The effect of glass on a ray.
   struct Sight {
@@ -213,8 +213,7 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
   } else if ((hits.in_shape >> lane & 1U) != 0) {
     const ShapeHit& hit = hits.shapes[i];
     point.type = hit.type;
-    if (hit.face >= 0)
-      put_on_shape(*hit.model, hit.model->faces[static_cast<std::size_t>(hit.face)], hit.normal, point);
+    if (hit.face >= 0) put_on_shape(*hit.model, hit.face, hit.normal, point);
   } else {
     point.position = on_face(point.position, point.voxel, point.face);
   }
@@ -233,14 +232,14 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
 }
 
 // Sets the side of a shape that a point shows. Corrects the rounding of its position.
-void Tile::put_on_shape(const ShapeModel& model, const ModelFace& face, const Vec3& normal, SurfacePoint& point) {
+void Tile::put_on_shape(const ShapeModel& model, std::int16_t face, const Vec3& normal, SurfacePoint& point) {
   point.model = &model;
-  point.shape_face = &face;
+  point.shape_face = face;
   point.normal = normal;
   point.is_tilted = normal != Vec3(normal_of(point.face));
   if (point.is_tilted) return;
   const int axis = frame_of(point.face).axis;
-  point.position[axis] = double{face.corners[0][axis]} + point.voxel[axis];
+  point.position[axis] = double{model.faces[static_cast<std::size_t>(face)].corners[0][axis]} + point.voxel[axis];
 }
 
 Tile::Sight Tile::add_transparent(const Ray& ray, double max_t, std::size_t pixel) {
@@ -310,7 +309,7 @@ void Tile::fill_in(const Ray& ray, const GlassBody& body, const DVec3& normal, S
     point.type = body.type;
   } else if (body.model != nullptr) {
     point.type = body.type;
-    if (body.shape_face != nullptr) put_on_shape(*body.model, *body.shape_face, body.normal, point);
+    if (body.shape_face >= 0) put_on_shape(*body.model, body.shape_face, body.normal, point);
   } else {
     point.position = on_face(point.position, body.voxel, body.face);
   }

@@ -202,7 +202,7 @@ class BodiesOfGrid {
     GlassBody& part = parts_.emplace_back(body_of(span.shape->voxel, span.shape->type, t_enter, t_exit, starts_inside));
     if (is_plate) part.voxels = kThinnest;
     part.model = &model;
-    part.shape_face = face;
+    part.shape_face = starts_inside ? std::int16_t{-1} : span.enter.face;
     part.exit_in_shape = true;
     part.normal = span.normal(span.enter);
     part.exit_normal = span.normal(span.exit);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <limits>
 #include <vector>
 
@@ -11,8 +12,8 @@
 
 namespace quoin {
 
-/// A run of transparent voxels, parts of shapes or field solid, of one type along a ray. It counts as one piece of glass
-/// even if it spans grids and chunks.
+/// A run of transparent voxels, parts of shapes or field solid, of one type along a ray. It counts as one piece of
+/// glass even if it spans grids and chunks.
 struct GlassBody {
   std::int32_t placed = 0;  ///< the grid in which the ray enters the body
   IVec3 voxel{0};           ///< the voxel of entry, or that of the shape, or the cell of a field
@@ -27,16 +28,16 @@ struct GlassBody {
   bool in_field = false;                  ///< the ray enters through a field's surface; `face` is unused
   bool exit_in_field = false;             ///< the ray leaves through a field's surface; `exit_face` is unused
   VoxelType before = kAir;                ///< fields only: the transparent material that ends where this one begins
-  /// True for CellContent::TexturedGlass and textured shapes that the ray enters: colour and alpha are those of a texel,
-  /// of level 0.
+  /// True for CellContent::TexturedGlass and textured shapes that the ray enters: colour and alpha are those of a
+  /// texel of level 0.
   bool is_textured = false;
   Vec3 colour{0.0F};
   float alpha = 0.0F;
-  /// For shapes: the side through which the ray enters, or null if it starts inside; the model of `voxel`, else null;
-  /// and the outward normals where it enters and leaves, in the grid.
-  const ModelFace* shape_face = nullptr;
-  const ShapeModel* model = nullptr;
+  /// For shapes: the side through which the ray enters, an index into `model->faces`, or -1 if it starts inside; the
+  /// model of `voxel`, else null; and the outward normals where it enters and leaves, in the grid.
+  std::int16_t shape_face = -1;
   bool exit_in_shape = false;
+  const ShapeModel* model = nullptr;
   Vec3 normal{0.0F};
   Vec3 exit_normal{0.0F};
 };

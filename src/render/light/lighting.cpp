@@ -32,6 +32,17 @@ void set_direction(RayPacket& rays, std::size_t lane, DVec3 direction) {
   rays.direction_z[lane] = direction.z;
 }
 
+const ModelFace& face_of_shape(const SurfacePoint& point) {
+  QUOIN_ASSERT(point.model != nullptr && static_cast<std::size_t>(point.shape_face) < point.model->faces.size(),
+               "a side of the shape");
+  return point.model->faces[static_cast<std::size_t>(point.shape_face)];
+}
+
+// Returns true if a point of a shape lies on a side of its voxel.
+bool is_on_side(const SurfacePoint& point) {
+  return point.shape_face >= 0 && face_of_shape(point).on_side;
+}
+
 // The groups of points that are lit together.
 constexpr std::size_t kGroups = 16;
 
@@ -458,7 +469,7 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
     if (((group.unknown & ~traced) >> i & 1U) == 0) continue;
     const SurfacePoint& point = *group.points[i];
     // Sides inside a voxel have no corners of voxels.
-    if (point.model != nullptr && (point.shape_face == nullptr || !point.shape_face->on_side)) {
+    if (point.model != nullptr && !is_on_side(point)) {
       openness[i] = 1.0F;
       continue;
     }
@@ -600,7 +611,7 @@ Vec3 Lighting::texel_colour(const FaceTexels& face, const SurfacePoint& point) c
 
 Lighting::Colours Lighting::colours_of_shape(const SurfacePoint& point) const {
   const VoxelProperties& type = (*types_)[point.type];
-  const ModelFace& face = *point.shape_face;
+  const ModelFace& face = face_of_shape(point);
   const VoxelFace* const look = look_of(*point.model, face, type.faces);
   if (look == nullptr) return colours_of_type(point);
   const Vec3 tint = linear_colour(look->tint);
@@ -621,7 +632,7 @@ __attribute__((noinline)) Lighting::Colours Lighting::other_colours_at(const Sur
   QUOIN_ASSERT(placed < frames_.size(), "one of the placed grids");
   const bool is_bare = point.in_field && point.type == kAir;
   if (!detail_surfaces_.empty() && !is_bare) return {detail_surfaces_[placed].colour, detail_surfaces_[placed].emitted};
-  if (point.shape_face != nullptr) return colours_of_shape(point);
+  if (point.shape_face >= 0) return colours_of_shape(point);
   if (point.is_blended && surfaces_->has_textures()) {
     // Cells of halved fields are larger, but textures keep their size.
     const double scale = voxels_per_cell(point.placed);

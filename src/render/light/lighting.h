@@ -41,13 +41,12 @@ struct SurfacePoint {
   bool is_blended = false;       ///< fields: a blend of the materials around, as Surfaces::blend_of_field
   bool is_tilted = false;        ///< of a shape's turned element, or inclined fluid: `normal` counts, not `face`
   std::uint8_t orientation = 0;  ///< AxisOrientation::index of a cube that its state turns
-  /// For a shape: the side that is seen, and the model of `voxel`; null for others, and for what has the type's colour.
-  const ModelFace* shape_face = nullptr;
-  const ShapeModel* model = nullptr;
   /// Index into TypeFaces::sides of the texture that it shows; kSideOfFace: that of `face`.
   std::uint16_t side = kSideOfFace;
-  Vec3 normal{0.0F};  ///< of a field or where `is_tilted`, in its grid, of unit length or 0
-  float lift = 0.0F;  ///< of a field: height of the position above the surface, along the normal
+  std::int16_t shape_face = -1;       ///< for a shape: the side that is seen, an index into `model->faces`, or -1
+  const ShapeModel* model = nullptr;  ///< of `voxel`, for a shape
+  Vec3 normal{0.0F};                  ///< of a field or where `is_tilted`, in its grid, of unit length or 0
+  float lift = 0.0F;                  ///< of a field: height of the position above the surface, along the normal
   PointKind kind = PointKind::Surface;
   std::uint32_t pixel = 0;  ///< seed for random numbers: combines pixel and sample
   float openness = -1.0F;   ///< 0 to 1 if already known, independent of the occlusion options; less than 0: unknown

@@ -240,5 +240,43 @@ TEST(PathTextures, SamplesLightOfTexels) {
   for (int x = 0; x < 24; x += 6) EXPECT_NEAR(part(a, x, x + 6) / part(b, x, x + 6), 1.0, 0.05) << x;
 }
 
+// Shapes: paths meet their sides, with their textures.
+TEST(PathShapes, CubeAsShapeIsLitLikeCube) {
+  const auto image_of = [](bool with_shapes) {
+    Scene scene;
+    const VoxelType ground = add_type(scene, {150, 150, 150});
+    VoxelProperties crate = textured({.texture = noise(255)});
+    if (with_shapes) crate.shapes = VoxelShape::box({0, 0, 0}, {16, 16, 16});
+    const VoxelType type = scene.types.add(crate).value();
+    Grid grid;
+    grid.fill_box({{-6, -1, -6}, {6, 0, 6}}, ground);
+    for (const IVec3 at : {IVec3(0, 0, 0), IVec3(1, 0, 0), IVec3(0, 1, 0), IVec3(-2, 0, 2)}) grid.set(at, type);
+    place(scene, std::move(grid));
+    return path_image(scene, towards({4.0, 4.0, 7.0}, {0.0, 0.5, 0.0}), under_even_sky(32, 32, 64));
+  };
+  const PathImage cube = image_of(false);
+  EXPECT_LT(difference(cube, image_of(true)), 0.01);
+}
+
+TEST(PathShapes, PathsMeetOnlyTheForm) {
+  Scene scene;
+  const VoxelType ground = add_type(scene, {255, 255, 255});
+  VoxelProperties slab{.name = "slab", .colour = {255, 0, 0, 255}};
+  slab.shapes = VoxelShape::box({0, 0, 0}, {16, 8, 8});
+  const VoxelType type = scene.types.add(slab).value();
+  Grid grid;
+  grid.fill_box({{-4, -1, -4}, {4, 0, 4}}, ground);
+  grid.set({0, 0, 0}, type);
+  place(scene, std::move(grid));
+  PathOptions options = under_even_sky(16, 16, 4);
+  options.layers = true;
+  const PathImage image = path_image(scene, from_above(0.5, 10.0, 0.5, 1.0), options);
+  // The slab fills the half at -Z, the upper half of the image.
+  EXPECT_EQ(image.types[16 * 4 + 8], type);
+  EXPECT_EQ(image.types[16 * 12 + 8], ground);
+  EXPECT_FLOAT_EQ(image.depth.values[16 * 4 + 8], 9.5F);
+  EXPECT_FLOAT_EQ(image.depth.values[16 * 12 + 8], 10.0F);
+}
+
 }  // namespace
 }  // namespace quoin

@@ -226,7 +226,7 @@ TEST(ShapeQuery, HitOutsideItsVoxelNamesTheVoxel) {
   EXPECT_EQ(hit->voxel, IVec3(0));
   EXPECT_EQ(hit->type, world.types.beam);
   EXPECT_DOUBLE_EQ(hit->t, 5.0 + 7.0 / 16.0);
-  // That element does not collide.
+  // The upright element does not collide.
   EXPECT_FALSE(first_hit(tracer, {{0.5, 1.5, -5.0}, {0.0, 0.0, 1.0}}, 100.0, {.types = QueryTypes::Colliding}));
 }
 

@@ -88,19 +88,22 @@ std::uint32_t blocked_by_field(const PlacedGrid& placed, const RayPacket& rays_i
   return blocked | quoin::any_hits(*placed.opaque_field, rest);
 }
 
-// As above, for the shapes of a placed grid.
-std::uint32_t blocked_by_shapes(const PlacedGrid& placed, const VoxelRegistry& types, const RayPacket& rays_in_grid,
-                                std::uint32_t blocked) {
-  if (placed.shapes == nullptr || blocked == rays_in_grid.active) return blocked;
-  RayPacket rest = rays_in_grid;
-  rest.active &= ~blocked;
-  return blocked | any_shapes(*placed.shapes, types, rest);
+// Sets `blocked[i]` to the rays of packet i that hit an opaque voxel or shape of a placed grid. They are in its space.
+void find_blocked(const PlacedGrid& placed, const VoxelRegistry& types, std::span<const RayPacket> packets_in_grid,
+                  std::span<std::uint32_t> blocked) {
+  if (placed.shapes != nullptr) return any_solids(*placed.shapes, *placed.opaque, types, packets_in_grid, blocked);
+  if (has_opaque(placed)) return quoin::any_hits(*placed.opaque, packets_in_grid, blocked);
+  std::fill_n(blocked.begin(), packets_in_grid.size(), 0U);
 }
 
 // Returns the rays that hit an opaque voxel, shape or field of a placed grid. They are in its space.
 std::uint32_t blocked_by(const PlacedGrid& placed, const VoxelRegistry& types, const RayPacket& rays_in_grid) {
-  std::uint32_t blocked = has_opaque(placed) ? quoin::any_hits(*placed.opaque, rays_in_grid) : 0;
-  blocked = blocked_by_shapes(placed, types, rays_in_grid, blocked);
+  std::uint32_t blocked = 0;
+  if (placed.shapes != nullptr) {
+    any_solids(*placed.shapes, *placed.opaque, types, std::span(&rays_in_grid, 1), std::span(&blocked, 1));
+  } else if (has_opaque(placed)) {
+    blocked = quoin::any_hits(*placed.opaque, rays_in_grid);
+  }
   return blocked_by_field(placed, rays_in_grid, blocked);
 }
 
@@ -193,7 +196,7 @@ struct SceneView::Impl {
     move(grid_from_view.front(), rays_in_view, rays);
     if (placed.shapes != nullptr) {
       hits.in_shape =
-          first_solids(*placed.shapes, *placed.opaque, tracer->scene().types, rays, hits.grids, hits.shapes);
+          first_solids(*placed.shapes, *placed.voxels, tracer->scene().types, rays, hits.grids, hits.shapes);
     } else if (has_opaque(placed)) {
       quoin::first_hits(*placed.opaque, rays, hits.grids);
     }
@@ -221,7 +224,7 @@ struct SceneView::Impl {
       RoomFor<RayPacket::Lanes<ShapeHit>> room_for_shapes;
       RayPacket::Lanes<ShapeHit>& shapes = *room_for_shapes;
       const std::uint32_t in_shape =
-          first_solids(*placed.shapes, *placed.opaque, tracer->scene().types, rays, found, shapes);
+          first_solids(*placed.shapes, *placed.voxels, tracer->scene().types, rays, found, shapes);
       met = found.hit;
       const std::uint32_t taken = take_nearer(index, found, left, hits) & in_shape;
       hits.in_shape |= taken;
@@ -348,14 +351,8 @@ void SceneView::any_hits(std::int32_t home, std::span<const RayPacket> packets_i
   const auto own = static_cast<std::size_t>(home);
   QUOIN_ASSERT(own < placed.size() && impl_->is_current(), "a placed grid of a tracer that was not updated since");
   QUOIN_ASSERT(blocked.size() >= packets_in_grid.size(), "a mask for every packet");
-  if (has_opaque(placed[own])) {
-    quoin::any_hits(*placed[own].opaque, packets_in_grid, blocked);
-  } else {
-    std::fill_n(blocked.begin(), packets_in_grid.size(), 0U);
-  }
-  const VoxelRegistry& types = impl_->tracer->scene().types;
+  find_blocked(placed[own], impl_->tracer->scene().types, packets_in_grid, blocked);
   for (std::size_t i = 0; i < packets_in_grid.size(); ++i) {
-    blocked[i] = blocked_by_shapes(placed[own], types, packets_in_grid[i], blocked[i]);
     blocked[i] = blocked_by_field(placed[own], packets_in_grid[i], blocked[i]);
     if (!impl_->is_alone) blocked[i] = impl_->blocked_by_others(own, packets_in_grid[i], blocked[i]);
   }

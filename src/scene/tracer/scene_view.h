@@ -23,7 +23,8 @@ struct Affine {
   [[nodiscard]] DVec3 point(const DVec3& p) const { return axes * p + offset; }
 };
 
-/// The hits of a ray packet in a scene, with voxels, shapes or fields. Lanes without a bit in `grids.hit` are undefined.
+/// The hits of a ray packet in a scene, with voxels, shapes or fields. Lanes without a bit in `grids.hit` are
+/// undefined.
 struct SceneHits {
   PacketHits grids;                         ///< voxels and faces in the grid, distances of the packet's rays
   RayPacket::Lanes<std::int32_t> placed{};  ///< index into SceneTracer::placed
@@ -65,8 +66,8 @@ class SceneView {
   /// voxel, and a voxel before a field.
   void first_hits(const RayPacket& rays_in_view, SceneHits& hits) const;
 
-  /// Returns the rays that hit an opaque voxel, visible part of a shape or field of any instance. They are in the space of grid `home`, which is
-  /// tested first.
+  /// Returns the rays that hit an opaque voxel, visible part of a shape or field of any instance. They are in the space
+  /// of grid `home`, which is tested first.
   [[nodiscard]] std::uint32_t any_hits(std::int32_t home, const RayPacket& rays_in_grid) const;
   /// Sets `blocked[i]` to the result of `any_hits` for packet i. Faster than one by one for endless rays.
   /// Requires: at least as many elements in `blocked` as packets.

@@ -29,9 +29,10 @@ Direction side_of(int axis, bool is_upper) {
 }
 
 // Finds the way of a ray, relative to the shape's voxel, through a box. Returns false if there is none.
-bool cross_box(const ModelBox& box, const Ray& ray, ShapeSpan& span) {
+bool cross_box(const ModelBox& box, const Ray& ray, const DVec3& inverse_direction, ShapeSpan& span) {
   DVec3 origin = ray.origin;
   DVec3 direction = ray.direction;
+  DVec3 inverse = inverse_direction;
   if (box.is_turned) {
     const DVec3 from = ray.origin - DVec3(box.origin);
     for (int axis = 0; axis < 3; ++axis) {
@@ -39,6 +40,7 @@ bool cross_box(const ModelBox& box, const Ray& ray, ShapeSpan& span) {
       origin[axis] = component(row, from);
       direction[axis] = component(row, ray.direction);
     }
+    inverse = 1.0 / direction;
   }
   span.enter.t = -kFar;
   span.exit.t = kFar;
@@ -52,9 +54,9 @@ bool cross_box(const ModelBox& box, const Ray& ray, ShapeSpan& span) {
       continue;
     }
     const bool is_forward = direction[axis] > 0.0;
-    const double near = ((is_forward ? low : high) - origin[axis]) / direction[axis];
-    const double far = ((is_forward ? high : low) - origin[axis]) / direction[axis];
-    // Of several planes at once, the last one counts, as for voxels.
+    const double near = ((is_forward ? low : high) - origin[axis]) * inverse[axis];
+    const double far = ((is_forward ? high : low) - origin[axis]) * inverse[axis];
+    // If a ray crosses several planes at once, the last one counts, as for voxels.
     if (near >= span.enter.t) {
       span.enter.t = near;
       enter_axis = axis;
@@ -120,21 +122,21 @@ void cross_fluid(const ShapeModel& model, const Ray& ray, ShapeSpan& span, const
 }
 
 template <class Visit>
-void cross_shape(const PlacedShape& shape, const Ray& ray_in_grid, const Visit& visit) {
+void cross_shape(const PlacedShape& shape, const Ray& ray_in_grid, const DVec3& inverse_direction, const Visit& visit) {
   const ShapeModel& model = *shape.model;
   const Ray ray{ray_in_grid.origin - DVec3(shape.voxel), ray_in_grid.direction};
   ShapeSpan span;
   span.shape = &shape;
   for (const ModelBox& box : model.boxes) {
     span.box = &box;
-    if (cross_box(box, ray, span)) visit(static_cast<const ShapeSpan&>(span));
+    if (cross_box(box, ray, inverse_direction, span)) visit(static_cast<const ShapeSpan&>(span));
   }
   if (model.free_faces == 0) return;
   span.box = nullptr;
   cross_fluid(model, ray, span, visit);
 }
 
-// Returns true if a face hides what is behind it at a point, relative to the shape's voxel.
+// Returns true if a face hides the background at a point, relative to the shape's voxel.
 bool is_visible_at(const VoxelProperties& type, const ShapeModel& model, const ModelFace& face, const DVec3& point) {
   if (type.visibility == Visibility::Opaque) return true;
   const VoxelFace* const look = look_of(model, face, type.faces);
@@ -142,6 +144,51 @@ bool is_visible_at(const VoxelProperties& type, const ShapeModel& model, const M
   if (look->alpha == FaceAlpha::Opaque) return true;
   return shape_texel(face, *look, point).a >= kCutoutAlpha;
 }
+
+// The way of a ray from cell to cell. Each plane is crossed at the same distance as in trace::Walk, which is faster on
+// long ways.
+class CellSteps {
+ public:
+  CellSteps(const Ray& ray, IVec3 cell, double t) : ray_(ray), cell_(cell), t_(t) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double d = ray.direction[axis];
+      inverse_[axis] = d != 0.0 ? 1.0 / d : 0.0;
+      find_next(axis);
+    }
+  }
+  [[nodiscard]] IVec3 cell() const { return cell_; }
+  // Return the distance of the ray's entry into the cell and, after a step, the face of entry.
+  [[nodiscard]] double t() const { return t_; }
+  [[nodiscard]] Direction face() const { return side_of(axis_, ray_.direction[axis_] < 0.0); }
+  [[nodiscard]] double t_exit() const { return std::min(std::min(next_[0], next_[1]), next_[2]); }
+  void step() {
+    if (next_[0] <= next_[1]) {
+      axis_ = next_[0] <= next_[2] ? 0 : 2;
+    } else {
+      axis_ = next_[1] <= next_[2] ? 1 : 2;
+    }
+    t_ = std::max(t_, next_[axis_]);
+    cell_[axis_] += ray_.direction[axis_] > 0.0 ? 1 : -1;
+    find_next(axis_);
+  }
+
+ private:
+  void find_next(int axis) {
+    const double d = ray_.direction[axis];
+    const double plane = cell_[axis] + (d > 0.0 ? 1.0 : 0.0);
+    next_[axis] = d != 0.0 ? (plane - ray_.origin[axis]) * inverse_[axis] : kFar;
+  }
+
+  const Ray& ray_;
+  IVec3 cell_;
+  double t_;
+  int axis_ = 0;
+  DVec3 inverse_{0.0};
+  DVec3 next_{0.0};
+};
+
+// Cells that a ray passes by CellSteps before it goes on through the tree.
+constexpr int kSteps = 24;
 
 // A ray on its way through the cells that shapes touch.
 class ShapeRay {
@@ -151,6 +198,7 @@ class ShapeRay {
       : shapes_(shapes), types_(types), reader_(reader), ray_(ray), max_t_(max_t), parts_(parts) {
     const DVec3 size = glm::abs(ray.direction);
     room_ = kBetweenCells / std::max(std::max(size.x, size.y), size.z);
+    inverse_ = 1.0 / ray.direction;
   }
 
   // Looks at the shapes of one cell. Returns true if there is a hit, which is then the nearest one.
@@ -160,7 +208,7 @@ class ShapeRay {
     for (const PlacedShape& shape : shapes) {
       if (parts_ == ShapeParts::Opaque && types_[shape.type].visibility != Visibility::Opaque) continue;
       if (parts_ == ShapeParts::Colliding && !types_[shape.type].collides) continue;
-      cross_shape(shape, ray_, [&](const ShapeSpan& span) {
+      cross_shape(shape, ray_, inverse_, [&](const ShapeSpan& span) {
         if (parts_ == ShapeParts::Visible) return take_visible(span);
         if (parts_ != ShapeParts::Colliding || span.collides()) take_solid(span);
       });
@@ -168,28 +216,28 @@ class ShapeRay {
     return found_;
   }
 
-  struct CellExit {
-    double t = kFar;
-    Direction next_face = Direction::PosX;  // of the next cell
-  };
-  // Returns where the ray leaves a cell.
-  [[nodiscard]] CellExit exit_of(IVec3 cell) const {
-    CellExit exit;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double d = ray_.direction[axis];
-      if (d == 0.0) continue;
-      const double t = (cell[axis] + (d > 0.0 ? 1.0 : 0.0) - ray_.origin[axis]) / d;
-      if (!(t < exit.t)) continue;
-      exit = {t, side_of(axis, d < 0.0)};
-    }
-    return exit;
-  }
-
-  // Looks at all cells.
-  bool meet_cells() {
-    visit_hits(shapes_.touched, ray_, max_t_,
-               [&](const VoxelSpan& span) { return !meet_shapes(reader_.at(span.voxel), span.t_enter, span.t_exit); });
+  // Looks at all cells from `t_begin` on.
+  bool meet_cells(double t_begin = 0.0) {
+    const Ray rest{ray_.origin + t_begin * ray_.direction, ray_.direction};
+    visit_hits(shapes_.touched, rest, max_t_ - t_begin, [&](const VoxelSpan& span) {
+      return !meet_shapes(reader_.at(span.voxel), t_begin + span.t_enter, t_begin + span.t_exit);
+    });
     return found_;
+  }
+  // As above, from the ray's origin. Faster if a shape is near.
+  bool meet_near_cells() {
+    const IBox bounds = shapes_.touched.bounds();
+    for (int axis = 0; axis < 3; ++axis) {
+      const double at = ray_.origin[axis];
+      if (!(at > bounds.min[axis] - kSteps && at < bounds.max[axis] + kSteps)) return meet_cells();
+    }
+    CellSteps steps(ray_, voxel_of(ray_.origin), 0.0);
+    for (int i = 0; i < kSteps; ++i, steps.step()) {
+      if (steps.t() > max_t_) return false;
+      const std::span<const PlacedShape> here = reader_.at(steps.cell());
+      if (!here.empty() && meet_shapes(here, steps.t(), steps.t_exit())) return true;
+    }
+    return meet_cells(steps.t());
   }
 
   [[nodiscard]] ShapeHit hit() const {
@@ -250,6 +298,7 @@ class ShapeRay {
   double max_t_;
   ShapeParts parts_;
   double room_;
+  DVec3 inverse_{0.0};  // of the direction; infinite where that is 0
   double begin_ = 0.0;
   double end_ = 0.0;
   ShapeSpan best_;
@@ -308,7 +357,7 @@ Rgba8 shape_texel(const ModelFace& face, const VoxelFace& look, const DVec3& poi
 }
 
 void visit_shape(const PlacedShape& shape, const Ray& ray_in_grid, FunctionRef<void(const ShapeSpan&)> visit) {
-  cross_shape(shape, ray_in_grid, visit);
+  cross_shape(shape, ray_in_grid, 1.0 / ray_in_grid.direction, visit);
 }
 
 bool first_shape(const TracedShapes& shapes, const VoxelRegistry& types, const Ray& ray_in_grid, double max_t,
@@ -322,50 +371,70 @@ bool first_shape(const TracedShapes& shapes, const VoxelRegistry& types, const R
 
 namespace {
 
-// What a ray meets after the first cell: a shape (true), or an opaque voxel or nothing in `next`.
-bool meet_solid_behind(ShapeRay& ray, const TracedShapes& shapes, ShapeIndex::Reader& reader,
-                       const OccupancyTree& opaque, const Ray& in_grid, double max_t, const ShapeRay::CellExit& exit,
+// The solids of a grid: opaque voxels and shapes. Both readers remember the last chunk.
+struct Solids {
+  Solids(const TracedShapes& of, const Grid& grid, const VoxelRegistry& registry)
+      : tree(of.solid), types(registry), voxels(grid), shapes(of.index) {}
+
+  const OccupancyTree& tree;
+  const VoxelRegistry& types;
+  GridReader voxels;
+  ShapeIndex::Reader shapes;
+};
+
+// Finds the first solid after a ray's first cell. Returns true for a shape; else sets `next` to an opaque voxel, if
+// there is one.
+bool meet_solid_behind(ShapeRay& ray, Solids& solids, const Ray& in_grid, double max_t, CellSteps& steps,
                        std::optional<RayHit>& next) {
-  if (exit.t > max_t) return false;
-  const Ray rest{in_grid.origin + exit.t * in_grid.direction, in_grid.direction};
   bool is_met = false;
-  visit_hits(shapes.solid, rest, max_t - exit.t, [&](const VoxelSpan& span) {
-    const std::span<const PlacedShape> here = reader.at(span.voxel);
-    const bool is_own = !here.empty() && here.front().voxel == span.voxel;
-    if (!is_own && (here.empty() || opaque.is_occupied(span.voxel))) {
-      const Direction face = span.starts_inside ? exit.next_face : span.face;
-      next = RayHit{span.voxel, face, exit.t + span.t_enter, false};
-      return false;
+  // Returns true if the ray ends in a cell.
+  const auto meet = [&](IVec3 cell, Direction face, double t_enter, double t_exit) {
+    if (solids.types.is_opaque(solids.voxels.get(cell))) {
+      next = RayHit{cell, face, t_enter, false};
+      return true;
     }
-    is_met = ray.meet_shapes(here, exit.t + span.t_enter, exit.t + span.t_exit);
-    return !is_met;
+    const std::span<const PlacedShape> here = solids.shapes.at(cell);
+    is_met = !here.empty() && ray.meet_shapes(here, t_enter, t_exit);
+    return is_met;
+  };
+  for (int i = 0; i < kSteps; ++i) {
+    steps.step();
+    if (steps.t() > max_t) return false;
+    if (meet(steps.cell(), steps.face(), steps.t(), steps.t_exit())) return is_met;
+  }
+  steps.step();
+  const double begin = steps.t();
+  if (begin > max_t) return false;
+  const Ray rest{in_grid.origin + begin * in_grid.direction, in_grid.direction};
+  visit_hits(solids.tree, rest, max_t - begin, [&](const VoxelSpan& span) {
+    const Direction face = span.starts_inside ? steps.face() : span.face;
+    return !meet(span.voxel, face, begin + span.t_enter, begin + span.t_exit);
   });
   return is_met;
 }
 
 }  // namespace
 
-std::uint32_t first_solids(const TracedShapes& shapes, const OccupancyTree& opaque, const VoxelRegistry& types,
+std::uint32_t first_solids(const TracedShapes& shapes, const Grid& voxels, const VoxelRegistry& types,
                            const RayPacket& rays_in_grid, PacketHits& hits, RayPacket::Lanes<ShapeHit>& in_shapes) {
   first_hits(shapes.solid, rays_in_grid, hits);
-  ShapeIndex::Reader reader(shapes.index);
+  Solids solids(shapes, voxels, types);
   std::uint32_t in_shape = 0;
   for (std::uint32_t left = hits.hit; left != 0; left &= left - 1) {
     const int lane = std::countr_zero(left);
     const auto i = static_cast<std::size_t>(lane);
     const IVec3 cell{hits.x[i], hits.y[i], hits.z[i]};
-    const std::span<const PlacedShape> here = reader.at(cell);
+    const std::span<const PlacedShape> here = solids.shapes.at(cell);
     if (here.empty()) continue;
-    if (here.front().voxel != cell && opaque.is_occupied(cell)) continue;
+    // A shape of another voxel may reach into an opaque one.
+    if (here.front().voxel != cell && types.is_opaque(solids.voxels.get(cell))) continue;
     const Ray in_grid = rays_in_grid.ray(lane);
     const double max_t = rays_in_grid.max_t[i];
-    ShapeRay ray(shapes, types, reader, in_grid, max_t, ShapeParts::Visible);
-    // The kernel and the exact walk may choose different cells next to an edge.
-    ShapeRay::CellExit exit = ray.exit_of(cell);
-    exit.t = std::max(exit.t, hits.t[i]);
+    ShapeRay ray(shapes, types, solids.shapes, in_grid, max_t, ShapeParts::Visible);
+    CellSteps steps(in_grid, cell, hits.t[i]);
     std::optional<RayHit> next;
-    if (ray.meet_shapes(here, hits.t[i], exit.t) ||
-        meet_solid_behind(ray, shapes, reader, opaque, in_grid, max_t, exit, next)) {
+    if (ray.meet_shapes(here, hits.t[i], steps.t_exit()) ||
+        meet_solid_behind(ray, solids, in_grid, max_t, steps, next)) {
       const ShapeHit& hit = in_shapes[i] = ray.hit();
       next = RayHit{hit.voxel, hit.direction, hit.t, hit.starts_inside};
       in_shape |= 1U << lane;
@@ -378,17 +447,24 @@ std::uint32_t first_solids(const TracedShapes& shapes, const OccupancyTree& opaq
   return in_shape;
 }
 
-std::uint32_t any_shapes(const TracedShapes& shapes, const VoxelRegistry& types, const RayPacket& rays_in_grid) {
+// Most rays that miss both kinds of solids are done after one tree.
+void any_solids(const TracedShapes& shapes, const OccupancyTree& opaque, const VoxelRegistry& types,
+                std::span<const RayPacket> packets_in_grid, std::span<std::uint32_t> blocked) {
+  any_hits(shapes.solid, packets_in_grid, blocked);
   ShapeIndex::Reader reader(shapes.index);
-  std::uint32_t met = 0;
-  for (std::uint32_t left = any_hits(shapes.touched, rays_in_grid); left != 0; left &= left - 1) {
-    const int lane = std::countr_zero(left);
-    const Ray in_grid = rays_in_grid.ray(lane);
-    ShapeRay ray(shapes, types, reader, in_grid, rays_in_grid.max_t[static_cast<std::size_t>(lane)],
-                 ShapeParts::Visible);
-    if (ray.meet_cells()) met |= 1U << lane;
+  for (std::size_t number = 0; number < packets_in_grid.size(); ++number) {
+    if (blocked[number] == 0) continue;
+    const RayPacket& packet = packets_in_grid[number];
+    RayPacket rays = packet;
+    rays.active = blocked[number];
+    blocked[number] = any_hits(opaque, rays);
+    for (std::uint32_t left = rays.active & ~blocked[number]; left != 0; left &= left - 1) {
+      const int lane = std::countr_zero(left);
+      const Ray in_grid = packet.ray(lane);
+      ShapeRay ray(shapes, types, reader, in_grid, packet.max_t[static_cast<std::size_t>(lane)], ShapeParts::Visible);
+      if (ray.meet_near_cells()) blocked[number] |= 1U << lane;
+    }
   }
-  return met;
 }
 
 }  // namespace quoin

@@ -72,9 +72,9 @@ struct ShapeUv {
 /// The parts of shapes that a ray can hit.
 enum class ShapeParts : std::uint8_t {
   All,        ///< boxes and fluids, with drawn sides or without
-  Colliding,  ///< those with which bodies collide
+  Colliding,  ///< the ones that stop moving bodies
   Opaque,     ///< those of an opaque material
-  Visible,    ///< drawn sides that hide what is behind: opaque ones, and cutout ones where their texel is visible
+  Visible,    ///< drawn sides that hide the background: opaque ones, and visible texels of cutout ones
 };
 
 /// Finds the nearest part of the shapes that a ray meets from 0 up to and including `max_t`. Returns false if there is
@@ -84,11 +84,12 @@ bool first_shape(const TracedShapes& shapes, const VoxelRegistry& types, const R
 
 /// Finds the nearest opaque voxel or visible part of a shape (ShapeParts::Visible) for each active ray of a packet. For
 /// shapes, the voxel of `hits` is that of the shape, and its face is ShapeHit::direction. Returns the lanes that hit
-/// shapes, with their entries in `in_shapes`. `opaque`: the tree of the grid's opaque voxels.
-std::uint32_t first_solids(const TracedShapes& shapes, const OccupancyTree& opaque, const VoxelRegistry& types,
+/// shapes, with their entries in `in_shapes`. `voxels`: the grid with the shapes.
+std::uint32_t first_solids(const TracedShapes& shapes, const Grid& voxels, const VoxelRegistry& types,
                            const RayPacket& rays_in_grid, PacketHits& hits, RayPacket::Lanes<ShapeHit>& in_shapes);
-/// Returns the rays that hit visible parts of shapes.
-[[nodiscard]] std::uint32_t any_shapes(const TracedShapes& shapes, const VoxelRegistry& types,
-                                       const RayPacket& rays_in_grid);
+/// Sets `blocked[i]` to the rays of packet i that hit opaque voxels or visible parts of shapes. `opaque`: the tree of
+/// the grid's opaque voxels. Requires: as many elements in `blocked` as packets.
+void any_solids(const TracedShapes& shapes, const OccupancyTree& opaque, const VoxelRegistry& types,
+                std::span<const RayPacket> packets_in_grid, std::span<std::uint32_t> blocked);
 
 }  // namespace quoin
