@@ -377,7 +377,7 @@ class CTextures : public testing::Test {
   std::array<quoin_face, 6> faces_{};
 };
 
-TEST_F(CTextures, OfTypesCanBeRead) {
+TEST_F(CTextures, AreReadFromTypes) {
   ASSERT_EQ(quoin_type_set_faces(scene_, 1, faces_.data()), QUOIN_OK) << quoin_last_error();
   const quoin_textures made = textures();
   std::array<quoin_face, 6> read{};
@@ -443,7 +443,7 @@ TEST_F(CTextures, AreLayersOfArrays) {
   EXPECT_EQ(quoin_free(made), QUOIN_OK);
 }
 
-TEST_F(CTextures, OfMeshesHaveNumbersCoordinatesAndTints) {
+TEST_F(CTextures, GiveMeshesNumbersCoordinatesAndTints) {
   ASSERT_EQ(quoin_type_set_faces(scene_, 1, faces_.data()), QUOIN_OK);
   const std::vector<std::uint8_t> bar(3, 1);  // 3 x 1 x 1 voxels
   auto array = sized<quoin_array>();

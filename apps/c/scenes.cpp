@@ -201,7 +201,8 @@ const char* validate_load_options(const quoin_load_options& options) {
 
 const char* validate_face(const quoin_face& face) {
   if (face.rgba == nullptr) return "the texels of a face are null";
-  if (face.texels < kMinTextureSize || face.texels > kMaxTextureSize || !std::has_single_bit(unsigned(face.texels)))
+  if (face.texels < kMinTextureSize || face.texels > kMaxTextureSize ||
+      !std::has_single_bit(static_cast<unsigned>(face.texels)))
     return "the texels per side of a face must be 16, 32, 64, 128, 256, 512 or 1024";
   if (face.turn < 0 || face.turn > 3) return "the turn of a face must be 0 to 3";
   if (face.alpha < QUOIN_FACE_OPAQUE || face.alpha > QUOIN_FACE_TRANSLUCENT)

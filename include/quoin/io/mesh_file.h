@@ -68,9 +68,9 @@ struct MeshFileOptions {
 ///            nearest filter when enlarged, mipmaps when reduced. The tint is the baseColorFactor. Emission has the
 ///            colours of the texture. Cutout faces have the alpha mode MASK and two sides, translucent ones BLEND,
 ///            without transmission. With SceneMeshes::atlas, blocks have the mean colours of their textures.
-///            TexturesIn::Atlas: one image of all textures and tints, which does not repeat, and one material per use
-///            of alpha, roughness, metalness and emission. Each texture has a margin of 16 texels that repeats its
-///            edge, so mipmap levels 0 to 4 do not mix textures. Clients also use higher levels, which do.
+///            TexturesIn::Atlas: one image of all textures and tints, which does not repeat; materials differ in alpha,
+///            roughness, metalness and emission. Each texture has a margin of 16 texels that repeats its edge, so
+///            mipmap levels 0 to 4 do not mix textures. Clients also use higher levels, which do.
 ///            Transparent types: one blended material each, with KHR_materials_transmission, KHR_materials_volume and
 ///            KHR_materials_ior. These and alpha match rendered images of the type's bodies at typical thickness
 ///            (MeshPart::thickness).
