@@ -1,15 +1,21 @@
 #include <quoin/mesh/blocky.h>
 
 #include <array>
+#include <bit>
 #include <cmath>
 #include <map>
 #include <random>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include <quoin/grid/voxel_shape.h>
+
 #include "core/death_for_tests.h"
+#include "grid/shapes/shapes_for_tests.h"
 #include "mesh/nets/sheets.h"
 
 namespace quoin {
@@ -145,6 +151,112 @@ TEST(ClosedSurface, IsManifoldForAllSetsOfEightVoxels) {
       EXPECT_NEAR(found.volume, static_cast<double>(each->voxel_count()), 0.4) << solid;
     }
   }
+}
+
+// Returns the 24 rotations by quarter turns.
+std::vector<AxisOrientation> rotations() {
+  std::vector<AxisOrientation> all;
+  for (int i = 0; i < AxisOrientation::kCount; ++i) {
+    if (!AxisOrientation::at(i).is_mirrored()) all.push_back(AxisOrientation::at(i));
+  }
+  return all;
+}
+
+// Expects a sound surface of cubes and shapes within their voxels. `error`: of the volume, where parts touch.
+void expect_sound_shapes(const Grid& grid, const VoxelRegistry& types, double error) {
+  const auto surface = closed_surface(grid, types);
+  ASSERT_TRUE(surface.has_value());
+  double volume = 0.0;
+  grid.for_each([&](IVec3 voxel, VoxelType) {
+    const ShapeModel* const model = shape_at(grid, types, voxel);
+    if (model == nullptr) volume += 1.0;
+    for (std::size_t i = 0; model != nullptr && i < model->bits.size(); ++i) {
+      volume += std::popcount(static_cast<unsigned>(model->bits[i])) / 4'096.0;
+    }
+  });
+  const Soundness found = soundness_of(*surface);
+  EXPECT_EQ(found.bad_edges, 0U);
+  EXPECT_EQ(found.bad_vertices, 0U);
+  EXPECT_NEAR(found.volume, volume, error);
+}
+
+// Of several boxes that overlap, touch or lie apart.
+VoxelShape random_shape(std::mt19937& random, std::size_t boxes) {
+  std::vector<ShapeElement> elements(boxes);
+  for (ShapeElement& element : elements) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const int size = 1 + static_cast<int>(random() % 10);
+      element.min[axis] = static_cast<float>(random() % static_cast<unsigned>(17 - size));
+      element.max[axis] = element.min[axis] + static_cast<float>(size);
+    }
+  }
+  return *VoxelShape::from_elements(std::move(elements));
+}
+
+TEST(ClosedSurface, IsManifoldForFortyShapesInAllTurns) {
+  std::mt19937 random(5);
+  for (std::size_t i = 0; i < 40; ++i) {
+    SCOPED_TRACE(i);
+    VoxelShapes shapes = random_shape(random, 1 + i % 5);
+    if (i == 0) shapes = shapes_for_tests::slab();
+    if (i == 1) shapes = shapes_for_tests::stairs();
+    if (i == 2) shapes = shapes_for_tests::fence();
+    VoxelRegistry types;
+    const VoxelType stone = *types.add({.name = "stone"});
+    const VoxelType shaped = *types.add(
+        {.name = "shape", .state_bits = 5, .orientations = {.by_value = rotations()}, .shapes = std::move(shapes)});
+    Grid grid;
+    for (int turn = 0; turn < 24; ++turn) {
+      const IVec3 at(3 * (turn % 6), 0, 3 * (turn / 6));
+      grid.set(at, shaped, {.state = static_cast<std::uint32_t>(turn)});
+      if (turn % 2 == 0) grid.set(at - IVec3(0, 1, 0), stone);
+      if (turn % 3 == 0) grid.set(at + IVec3(1, 1, 0), stone);
+    }
+    expect_sound_shapes(grid, types, 0.1);
+  }
+}
+
+TEST(ClosedSurface, IsManifoldForRandomShapesAmongVoxels) {
+  VoxelRegistry types;
+  (void)*types.add({.name = "stone"});
+  const auto turns = StateOrientations::about_y_and_upside_down();
+  (void)*types.add({.name = "slab", .state_bits = 3, .orientations = turns, .shapes = shapes_for_tests::slab()});
+  (void)*types.add({.name = "stairs", .state_bits = 3, .orientations = turns, .shapes = shapes_for_tests::stairs()});
+  (void)*types.add({.name = "fence", .shapes = shapes_for_tests::fence()});
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    std::mt19937 random(seed);
+    Grid grid;
+    for (int i = 0; i < 60; ++i) {
+      const auto part = [&] { return 60 + static_cast<int>(random() % 7); };
+      const auto type = static_cast<VoxelType>(random() % 5);
+      grid.set({part(), part(), part()}, type,
+               {.state = type == 2 || type == 3 ? static_cast<std::uint32_t>(random() % 8) : 0});
+    }
+    expect_sound_shapes(grid, types, 1.0);
+  }
+}
+
+TEST(ClosedSurface, HasPartsOfShapesInOtherVoxelsAndNoPlates) {
+  VoxelRegistry types;
+  const VoxelType stone = *types.add({.name = "stone"});
+  const VoxelType tall = *types.add(
+      {.name = "tall", .shapes = *VoxelShape::from_elements({{.min = Vec3(4, 0, 4), .max = Vec3(12, 24, 12)}})});
+  const VoxelType flower = *types.add({.name = "flower", .shapes = VoxelShape::crossed_plates()});
+  Grid grid;
+  grid.fill_box({IVec3(0), IVec3(3, 1, 3)}, stone);
+  grid.set({1, 1, 1}, tall);
+  grid.set({0, 1, 0}, flower);
+  std::int64_t flat = 0;
+  const auto surface = closed_surface(grid, types, {}, &flat);
+  ASSERT_TRUE(surface.has_value());
+  EXPECT_EQ(flat, 1);
+  const Soundness found = soundness_of(*surface);
+  EXPECT_EQ(found.bad_edges + found.bad_vertices, 0U);
+  EXPECT_NEAR(found.volume, 9.0 + 0.25 * 1.5, 1e-3);
+  // Without shapes both functions give the same.
+  Grid cubes;
+  cubes.fill_box({IVec3(0), IVec3(3, 1, 3)}, stone);
+  EXPECT_EQ(closed_surface(cubes, types)->positions, closed_surface(cubes)->positions);
 }
 
 TEST(ClosedSurface, IsManifoldForRandomVoxels) {

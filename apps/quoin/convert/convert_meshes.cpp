@@ -19,10 +19,12 @@ namespace quoin::tool {
 
 namespace {
 
-/// Meshes a grid as a closed surface for 3D printing.
-Result<MeshPart> part_for_printing(const Scene& scene, GridHandle grid, MeshStats& stats) {
-  auto surface = closed_surface(scene.grids()[grid].grid);
+/// Meshes a grid as a closed surface for 3D printing. Adds the voxels whose shapes have parts without volume to `flat`.
+Result<MeshPart> part_for_printing(const Scene& scene, GridHandle grid, MeshStats& stats, std::int64_t& flat) {
+  std::int64_t flat_here = 0;
+  auto surface = closed_surface(scene.grids()[grid].grid, scene.types, {}, &flat_here);
   if (!surface) return surface.error();
+  flat += flat_here;
   const auto quads = static_cast<std::int64_t>(surface->positions.size() / 4);
   stats.faces_total += 6 * scene.grids()[grid].grid.voxel_count();
   stats.faces_visible += quads;
@@ -50,12 +52,13 @@ Status convert_blockily(const Scene& scene, const SceneAnimation& animation, con
   ProgressBar bar(!options.is_one_of_many);
   outcome.mesher = options.mesher;
   const InstanceFilter filter = options.common.instances();
+  std::int64_t flat = 0;
   BlockySceneOptions wanted;
   wanted.mesh = {outcome.mesher == Mesher::Greedy, !options.occlusion_off, options.watertight};
   wanted.instances = filter;
   wanted.atlas = options.is_atlas;
   if (format_for_writing(options.output)->can(FormatCapability::Printing)) {
-    wanted.part_of = [&scene](GridHandle grid, MeshStats& stats) { return part_for_printing(scene, grid, stats); };
+    wanted.part_of = [&](GridHandle grid, MeshStats& stats) { return part_for_printing(scene, grid, stats, flat); };
   }
   const Progress progress = bar.listener("meshing");
   auto meshes = options.light ? mesh_lit_scene(scene, *options.light, wanted, options.common.threads, progress)
@@ -65,6 +68,10 @@ Status convert_blockily(const Scene& scene, const SceneAnimation& animation, con
   outcome.faces = {meshes->stats.faces_visible, meshes->stats.faces_total};
   outcome.seconds.mesh = watch.lap();
   warn_of_left_out(scene, filter, outcome.warnings);
+  if (flat > 0) {
+    outcome.warnings.push_back("plates without thickness, which have no volume to print, are left out in " +
+                               with_thousands(flat) + " voxels");
+  }
   add_lights(scene, options, *meshes, outcome.warnings);
   warn_of_data(voxels_with_data(scene), outcome.warnings);
   return write_meshes(*meshes, options, bar, outcome);

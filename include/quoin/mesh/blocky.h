@@ -102,7 +102,8 @@ struct VertexLook {
   std::uint32_t face = 0;
   /// Texture coordinates, rightwards and downwards, if `face` is not 0. Textures repeat.
   std::array<float, 2> uv{};
-  Vec3 normal{0.0F};  ///< of an inclined face, unit length; 0: that of the direction
+  Vec3 normal{0.0F};      ///< of an inclined face, unit length; 0: that of the direction
+  bool is_shape = false;  ///< the vertex is one of a shape, at any position
 
   bool operator==(const VertexLook&) const = default;
 };

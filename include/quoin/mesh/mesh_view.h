@@ -67,8 +67,8 @@ struct MeshView {
   return view;
 }
 
-/// Returns the face that a block's vertex shows, or null if it has its type's colour. Requires: the view is of blocks
-/// of `types`.
+/// Returns the face that a block's vertex shows, or null if it has its type's colour. Requires: a
+/// view of blocks with types of `types`.
 [[nodiscard]] inline const VoxelFace* face_at(const MeshView& view, std::size_t vertex, const VoxelRegistry& types) {
   QUOIN_ASSERT(vertex < view.types.size() && view.types[vertex] < types.size(), "a vertex of a registered type");
   if (!view.looks.empty() && view.looks[vertex].face != 0) return &view.faces[view.looks[vertex].face - 1];

@@ -153,9 +153,15 @@ class VertexWriter {
   [[nodiscard]] static std::size_t face_number(VoxelType type, Direction direction) {
     return std::size_t{6} * type + static_cast<std::size_t>(direction);
   }
-  [[nodiscard]] std::uint32_t texture(VoxelType type, Direction direction) const {
-    const std::size_t number = face_number(type, direction);
-    return number < textures_.size() ? textures_[number] : ~std::uint32_t{0};
+  // Those of a type that its state turns follow behind the faces of all types.
+  [[nodiscard]] std::size_t face_number(const Quad& quad) const {
+    const std::size_t orientation = quad.bits >> Quad::kOrientationShift;
+    const std::size_t number = face_number(quad.type(), quad.direction());
+    if (orientation == 0 || quad.type() >= turned_.size() || turned_[quad.type()] == 0) return number;
+    return turned_[quad.type()] + 6 * orientation + static_cast<std::size_t>(quad.direction());
+  }
+  [[nodiscard]] std::uint32_t texture(std::size_t face) const {
+    return face < textures_.size() ? textures_[face] : ~std::uint32_t{0};
   }
   [[nodiscard]] std::uint8_t turn(VoxelType type, Direction direction) const {
     const std::size_t number = face_number(type, direction);
@@ -164,10 +170,14 @@ class VertexWriter {
   [[nodiscard]] std::array<std::array<float, 2>, 4> texture_uvs(const Quad& quad) const;
   [[nodiscard, gnu::visibility("hidden")]] std::vector<std::array<float, 2>> texture_uvs(const MeshView& mesh) const;
   void read_faces(const VoxelRegistry& types, const TextureSet& textures);
+  // Calls `visit(face, type's properties)` for each number of a face; face is null for types without textures.
+  template <class Visit>
+  static void for_each_face(const VoxelRegistry& types, const Visit& visit);
 
   VertexLayout layout_;
   // [element][type], of tints [element][face_number]; the last entry is for unregistered types
   std::vector<std::vector<Colour>> colours_;
+  std::vector<std::size_t> turned_;      // by type: the number of its first face with an orientation, or 0
   std::vector<std::uint32_t> textures_;  // [face_number]; empty if no element needs them
   std::vector<std::uint8_t> turns_;      // [face_number]: turn + 4 * mirrored; empty if no element needs them
 };

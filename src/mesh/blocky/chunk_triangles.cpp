@@ -174,19 +174,20 @@ void put_quad(const Quad& quad, IVec3 origin, Cursor& at, BlockyTriangles& out) 
   at.index += 6;
 }
 
-// Appends the triangles of a shape's face.
+// Appends the triangles of a shape's face. A triangle has a fourth vertex that no index names, so that the vertices of
+// each face begin at a multiple of four.
 void append_face(const ShapeFace& face, IVec3 origin, BlockyTriangles& out) {
   const FaceOcclusion occlusion = face.occlusion();
-  const std::size_t corners = face.is_triangle() ? 3 : 4;
+  const bool is_triangle = face.is_triangle();
   const auto first = static_cast<std::uint32_t>(out.positions.size());
-  for (std::size_t i = 0; i < corners; ++i) {
+  for (std::size_t i = 0; i < 4; ++i) {
     out.positions.push_back(Vec3(origin + face.voxel()) + face.model_face().corners[i]);
     out.directions.push_back(face.model_face().direction);
     out.occlusion.push_back(occlusion[i]);
     out.types.push_back(face.type);
   }
-  const std::array<std::uint8_t, 6>& order = triangle_corners(corners == 4 && flips_diagonal(occlusion));
-  for (std::size_t i = 0; i < (corners == 4 ? 6U : 3U); ++i) out.indices.push_back(first + order[i]);
+  const std::array<std::uint8_t, 6>& order = triangle_corners(!is_triangle && flips_diagonal(occlusion));
+  for (std::size_t i = 0; i < (is_triangle ? 3U : 6U); ++i) out.indices.push_back(first + order[i]);
 }
 
 void append_outline(const Quad& quad, IVec3 origin, const std::vector<OutlinePoint>& outline, BlockyTriangles& out) {
@@ -349,6 +350,7 @@ Status ChunkTriangles::append_shapes(const ShapeFaceBuffer& shapes, IVec3 origin
     const std::uint32_t number = look == nullptr ? 0 : looks_[which].number_of(*look, out);
     for (std::size_t i = first; i < out.positions.size(); ++i) {
       VertexLook& vertex = out.looks[i];
+      vertex.is_shape = true;
       vertex.face = number;
       if (look != nullptr) vertex.uv = texture_uv(shown, *look, shown.uv[i - first]);
       if (is_inclined) vertex.normal = shown.normal;
