@@ -29,7 +29,15 @@ std::uint32_t copy_vertex(const MeshView& source, std::size_t from, BlockyTriang
   target.directions.push_back(source.directions[from]);
   if (!source.block_occlusion.empty()) target.occlusion.push_back(source.block_occlusion[from]);
   target.types.push_back(source.types[from]);
+  if (!source.looks.empty()) target.looks.push_back(source.looks[from]);
   return static_cast<std::uint32_t>(target.positions.size() - 1);
+}
+
+/// Returns true if any block has a look of its own (VertexLook).
+bool have_looks(const SceneMeshes& meshes) {
+  return std::ranges::any_of(meshes.parts, [](const MeshPart& part) {
+    return std::ranges::any_of(part.surfaces, [](const MeshView& view) { return !view.looks.empty(); });
+  });
 }
 
 /// Appends vertex `from` of a smooth surface; returns its index in `target`.
@@ -92,7 +100,8 @@ const char* material_name(SurfaceClass surface) {
 MaterialPalette::MaterialPalette(const SceneMeshes& meshes, FaceColours faces)
     : types_(meshes.types),
       faces_(faces),
-      draws_textures_(faces != FaceColours::Means && meshes.types.has_textures() && meshes.atlas.rgb.empty()),
+      draws_textures_(faces != FaceColours::Means && (meshes.types.has_textures() || have_looks(meshes)) &&
+                      meshes.atlas.rgb.empty()),
       face_writer_({2 * sizeof(float), {{VertexAttribute::TextureUv, VertexFormat::Float32x2, 0}}}, types_) {
   const auto rows = static_cast<std::uint32_t>((types_.size() + kPaletteWidth - 1) / kPaletteWidth);
   rows_ = std::bit_ceil(std::max(rows, 1U));
@@ -103,9 +112,9 @@ MaterialPalette::MaterialPalette(const SceneMeshes& meshes, FaceColours faces)
     for (const MeshView& view : part.surfaces) {
       if (view.has_albedo()) continue;
       std::vector<bool>& of_class = used.at(static_cast<std::size_t>(view.surface));
-      for (const VoxelType type : view.types) {
-        QUOIN_ASSERT(type < types_.size(), "a type of the registry");
-        of_class[type] = !draws_textures_ || types_[type].faces.empty();
+      for (std::size_t i = 0; i < view.types.size(); ++i) {
+        QUOIN_ASSERT(view.types[i] < types_.size(), "a type of the registry");
+        if (face_of(view, i) == nullptr) of_class[view.types[i]] = true;
       }
       if (draws_textures_) add_textures_of(view);
     }
@@ -125,13 +134,6 @@ Status MaterialPalette::validate() const {
                                                   " texels per side; write an image per texture");
 }
 
-const VoxelProperties* MaterialPalette::textured_type(const MeshView& view, std::size_t vertex) const {
-  if (!draws_textures_) return nullptr;
-  QUOIN_ASSERT(vertex < view.types.size() && view.types[vertex] < types_.size(), "a vertex of a registered type");
-  const VoxelProperties& type = types_[view.types[vertex]];
-  return type.faces.empty() ? nullptr : &type;
-}
-
 std::size_t MaterialPalette::texture_of(const VoxelFace& face) const {
   const auto layer = texture_layers_.find(face.texture);
   QUOIN_ASSERT(layer.has_value(), "a texture that was added");
@@ -145,41 +147,43 @@ const FaceAtlas::Tile& MaterialPalette::tile_of(const VoxelFace& face) const {
 }
 
 MaterialPalette::TexturedLook MaterialPalette::textured_look(const MeshView& view, std::size_t vertex) const {
-  const VoxelProperties* const type = textured_type(view, vertex);
-  QUOIN_ASSERT(type != nullptr, "a textured face");
-  const VoxelFace& face = type->faces[view.directions[vertex]];
+  const VoxelFace* const shown = face_of(view, vertex);
+  QUOIN_ASSERT(shown != nullptr, "a textured face");
+  const VoxelFace& face = *shown;
+  const VoxelProperties& type = types_[view.types[vertex]];
   const auto unit = [](float value, float otherwise) { return value >= 0.0F ? std::min(value, 1.0F) : otherwise; };
   TexturedLook look;
   look.surface = view.surface;
+  const bool is_in_atlas = has_face_atlas() && !face.texture.is_null();
+  if (!face.texture.is_null()) look.texture = is_in_atlas ? 0 : texture_of(face);
   look.alpha = face.alpha;
-  if (!has_face_atlas()) {
-    look.texture = texture_of(face);
+  if (!is_in_atlas) {
     look.red = face.tint.r;
     look.green = face.tint.g;
     look.blue = face.tint.b;
   }
-  look.roughness = unit(type->roughness, 1.0F);
-  look.metalness = unit(type->metalness, 0.0F);
-  look.emission = emits(view.surface) ? clamped_emission(type->emission) : 0.0F;
+  look.roughness = unit(type.roughness, 1.0F);
+  look.metalness = unit(type.metalness, 0.0F);
+  look.emission = emits(view.surface) ? clamped_emission(type.emission) : 0.0F;
   return look;
 }
 
 void MaterialPalette::add_textures_of(const MeshView& view) {
   // Most vertices have the face of the one before.
-  std::pair<VoxelType, Direction> last{kAir, Direction::PosX};
+  std::pair<VoxelType, const VoxelFace*> last{kAir, nullptr};
   for (std::size_t i = 0; i < view.types.size(); ++i) {
-    const VoxelProperties* const type = textured_type(view, i);
-    if (type == nullptr || std::pair(view.types[i], view.directions[i]) == last) continue;
-    last = {view.types[i], view.directions[i]};
-    const VoxelFace& face = type->faces[view.directions[i]];
-    const Texture& texture = face.texture;
-    const TextureLayer layer = texture_layers_.add(texture);
-    if (texture_by_layer_.try_emplace({layer.array, layer.layer}, textures_.size()).second) {
-      textures_.push_back(texture);
-    }
-    const std::pair tile(texture_of(face), number_of(face.tint));
-    if (has_face_atlas() && tile_by_texture_.try_emplace(tile, atlas_.tiles().size()).second) {
-      atlas_.add(texture, face.tint);
+    const VoxelFace* const face = face_of(view, i);
+    if (face == nullptr || std::pair(view.types[i], face) == last) continue;
+    last = {view.types[i], face};
+    if (!face->texture.is_null()) {
+      const TextureLayer layer = texture_layers_.add(face->texture);
+      if (texture_by_layer_.try_emplace({layer.array, layer.layer}, textures_.size()).second) {
+        textures_.push_back(face->texture);
+      }
+      const std::pair tile(texture_of(*face), number_of(face->tint));
+      if (has_face_atlas() && tile_by_texture_.try_emplace(tile, atlas_.tiles().size()).second) {
+        atlas_.add(face->texture, face->tint);
+      }
     }
     textured_by_look_.try_emplace(textured_look(view, i));
   }
@@ -193,12 +197,13 @@ void MaterialPalette::make_textured_materials() {
   for (auto& [look, number] : textured_by_look_) {
     number = textured_materials_.size();
     SurfaceMaterial& material = textured_materials_.emplace_back();
-    material.name = names.add(face_image_name(look.texture), " ");
+    const bool has_texture = look.texture != kNoTexture;
+    material.name = names.add(has_texture ? face_image_name(look.texture) : "tint", " ");
     material.surface = look.surface;
     material.emission = look.emission;
     material.roughness = look.roughness;
     material.metalness = look.metalness;
-    material.texture = look.texture;
+    if (has_texture) material.texture = look.texture;
     material.alpha = look.alpha;
     material.tint = linear_colour(Rgba8{look.red, look.green, look.blue});
   }
@@ -206,7 +211,7 @@ void MaterialPalette::make_textured_materials() {
 
 std::size_t MaterialPalette::material_of(const MeshView& view, std::size_t vertex) const {
   QUOIN_ASSERT(vertex < view.types.size(), "a vertex with a type");
-  if (textured_type(view, vertex) == nullptr) return material_of(view.surface, view.types[vertex]);
+  if (face_of(view, vertex) == nullptr) return material_of(view.surface, view.types[vertex]);
   const auto found = textured_by_look_.find(textured_look(view, vertex));
   QUOIN_ASSERT(found != textured_by_look_.end(), "a face that the meshes have");
   return materials_.size() + smooth_materials_.size() + found->second;
@@ -418,9 +423,12 @@ PngImage MaterialPalette::emissive() const {
 }
 
 std::vector<std::array<float, 2>> MaterialPalette::face_coordinates(const MeshView& view) const {
-  QUOIN_ASSERT(view.positions.empty() || textured_type(view, 0) != nullptr, "textured faces");
+  QUOIN_ASSERT(view.positions.empty() || face_of(view, 0) != nullptr, "textured faces");
   std::vector<std::array<float, 2>> coordinates(view.positions.size());
   face_writer_.write(view, Vec3(0.0F), std::as_writable_bytes(std::span(coordinates)));
+  for (std::size_t i = 0; i < view.looks.size(); ++i) {
+    if (view.looks[i].face != 0) coordinates[i] = view.looks[i].uv;
+  }
   if (has_face_atlas()) move_into_atlas(view, coordinates);
   return coordinates;
 }
@@ -428,19 +436,25 @@ std::vector<std::array<float, 2>> MaterialPalette::face_coordinates(const MeshVi
 void MaterialPalette::move_into_atlas(const MeshView& view, std::vector<std::array<float, 2>>& coordinates) const {
   const Vec3 texel(1.0F / static_cast<float>(atlas_.width()), 1.0F / static_cast<float>(atlas_.height()), 0.0F);
   // Most vertices have the face of the one before.
+  const VoxelFace* last = nullptr;
   const FaceAtlas::Tile* tile = nullptr;
   Vec3 first(0.0F);  // the coordinates at the lowest corner of the voxel's face
   for (std::size_t i = 0; i < coordinates.size(); ++i) {
-    const Direction direction = view.directions[i];
-    if (i == 0 || view.types[i] != view.types[i - 1] || direction != view.directions[i - 1]) {
-      const VoxelFace& face = types_[view.types[i]].faces[direction];
-      const TextureFrame frame = texture_frame(face, direction);
+    const VoxelFace* const face = face_of(view, i);
+    QUOIN_ASSERT(face != nullptr, "a textured face");
+    if (face->texture.is_null()) continue;
+    if (face != last || view.directions[i] != view.directions[i - 1]) {
+      last = face;
+      const TextureFrame frame = texture_frame(*face, view.directions[i]);
       const auto is_negative = [](const IVec3& axis) { return axis.x + axis.y + axis.z < 0; };
       first = {is_negative(frame.right) ? 1.0F : 0.0F, is_negative(frame.down) ? 1.0F : 0.0F, 0.0F};
-      tile = &tile_of(face);
+      tile = &tile_of(*face);
     }
     const auto size = static_cast<float>(tile->texture.size());
-    const Vec3 inside = Vec3(coordinates[i][0], coordinates[i][1], 0.0F) + first;
+    const bool is_shape = !types_[view.types[i]].shapes.empty();  // its coordinates lie in the texture
+    Vec3 inside = Vec3(coordinates[i][0], coordinates[i][1], 0.0F) + (is_shape ? Vec3(0.0F) : first);
+    // Elements that reach outside their voxel show the texture's edge there.
+    if (is_shape) inside = glm::clamp(inside, 0.0F, 1.0F);
     QUOIN_ASSERT(inside.x >= 0.0F && inside.x <= 1.0F && inside.y >= 0.0F && inside.y <= 1.0F, "faces of one voxel");
     const Vec3 at = (Vec3(tile->x, tile->y, 0) + inside * size) * texel;
     coordinates[i] = {at.x, at.y};
@@ -566,8 +580,9 @@ void MaterialSurfaces::add(const MeshView& view, const MaterialPalette& palette)
   if (emits(view.surface) || is_transparent(view.surface) || palette.draws_textures()) {
     materials.resize(view.types.size());
     for (std::size_t i = 0; i < materials.size(); ++i) {
-      const bool is_as_before =
-          i > 0 && view.types[i] == view.types[i - 1] && view.directions[i] == view.directions[i - 1];
+      const bool is_as_before = i > 0 && view.types[i] == view.types[i - 1] &&
+                                view.directions[i] == view.directions[i - 1] &&
+                                (view.looks.empty() || view.looks[i].face == view.looks[i - 1].face);
       materials[i] = is_as_before ? materials[i - 1] : palette.material_of(view, i);
       if (!is_as_before) by_material.try_emplace(materials[i]);
     }
@@ -587,6 +602,7 @@ void MaterialSurfaces::add(const MeshView& view, const MaterialPalette& palette)
   for (const auto& [material, owned] : by_material) {
     surfaces_.push_back({view_of(owned->triangles, view.surface), material});
     surfaces_.back().view.light = owned->light;
+    surfaces_.back().view.faces = view.faces;
   }
 }
 

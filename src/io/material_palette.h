@@ -105,8 +105,8 @@ struct SurfaceMaterial {
   // For smooth surfaces and textured faces, which do not use the palette:
   float roughness = 1.0F;
   float metalness = 0.0F;
-  // For textured faces:
-  std::optional<std::size_t> texture{};  ///< index into MaterialPalette::textures
+  // For textured faces, and faces of shapes that have a tint only:
+  std::optional<std::size_t> texture{};  ///< index into MaterialPalette::textures; none: a tint only
   FaceAlpha alpha = FaceAlpha::Opaque;
   Vec3 tint{1.0F};  ///< linear, multiplies the texture
   // For smooth surfaces:
@@ -216,8 +216,9 @@ class MaterialPalette {
   /// Returns true if textured faces use an atlas, which does not repeat.
   [[nodiscard]] bool has_face_atlas() const { return faces_ == FaceColours::Atlas; }
   /// Returns the texture coordinates of each vertex of textured faces, from the upper left corner. Textures repeat, so
-  /// each face has coordinates relative to its own lowest corner, which are small. In an atlas, they lie within the
-  /// texture. Requires: all faces are textured and, for an atlas, cover one voxel each.
+  /// each face has coordinates relative to its own lowest corner, which are small; those of looks are given. In an
+  /// atlas, they lie within the texture. Requires: all faces are textured or have a look and, for an atlas, cover one
+  /// voxel each.
   [[nodiscard]] std::vector<std::array<float, 2>> face_coordinates(const MeshView& view) const;
   /// Returns true if blocks may have textured faces.
   [[nodiscard]] bool draws_textures() const { return draws_textures_; }
@@ -261,10 +262,12 @@ class MaterialPalette {
     auto operator<=>(const SmoothLook&) const = default;
   };
 
+  static constexpr std::size_t kNoTexture = ~std::size_t{0};
+
   /// The key of a material of textured faces.
   struct TexturedLook {
     SurfaceClass surface = SurfaceClass::Opaque;
-    std::size_t texture = 0;
+    std::size_t texture = kNoTexture;
     FaceAlpha alpha = FaceAlpha::Opaque;
     // The tint, sRGB. Not as an array: those of libc++ 16 have no order.
     std::uint8_t red = 255;
@@ -279,8 +282,10 @@ class MaterialPalette {
   [[nodiscard]] std::size_t texture_of(const VoxelFace& face) const;
   [[nodiscard]] const FaceAtlas::Tile& tile_of(const VoxelFace& face) const;
   void move_into_atlas(const MeshView& view, std::vector<std::array<float, 2>>& coordinates) const;
-  /// Returns the type of a block's vertex if its face is drawn with a texture.
-  [[nodiscard]] const VoxelProperties* textured_type(const MeshView& view, std::size_t vertex) const;
+  /// Returns the face of a block's vertex if it is drawn with a material of its own.
+  [[nodiscard]] const VoxelFace* face_of(const MeshView& view, std::size_t vertex) const {
+    return draws_textures_ ? face_at(view, vertex, types_) : nullptr;
+  }
   [[nodiscard]] TexturedLook textured_look(const MeshView& view, std::size_t vertex) const;
   void add_textures_of(const MeshView& view);
   void make_textured_materials();

@@ -80,10 +80,17 @@ bool all_finite(std::span<const Vec3> points) {
 
 const char* find_blocks_error(const MeshView& view, std::size_t types) {
   const bool has_all = is_one_a_vertex(view.directions, view) && is_one_a_vertex(view.types, view) &&
-                       is_none_or_one_a_vertex(view.block_occlusion, view) && is_none_or_one_a_vertex(view.atlas, view);
+                       is_none_or_one_a_vertex(view.block_occlusion, view) &&
+                       is_none_or_one_a_vertex(view.atlas, view) && is_none_or_one_a_vertex(view.looks, view);
   if (!has_all) return "arrays of different lengths";
   if (largest_of(view.types) >= types) return "an unregistered type";
   if (largest_of(view.directions) > Direction::NegZ) return "an invalid direction";
+  for (const VertexLook& look : view.looks) {
+    if (look.face > view.faces.size()) return "a look that names no face";
+    if (!std::isfinite(look.uv[0]) || !std::isfinite(look.uv[1])) return "a texture coordinate that is not finite";
+    if (!is_finite(DVec3(look.normal))) return "a normal that is not finite";
+  }
+  if (!view.looks.empty() && !view.atlas.empty()) return "both looks and an atlas";
   return largest_of(view.block_occlusion) > 3 ? "an occlusion above 3" : nullptr;
 }
 

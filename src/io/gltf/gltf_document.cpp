@@ -213,11 +213,13 @@ Json smooth_json(const SurfaceMaterial& material, const MaterialPalette& palette
 
 /// Returns a material of textured faces. Its emission has the colours of the texture.
 Json textured_json(const SurfaceMaterial& material, const GltfLayout& layout) {
-  QUOIN_ASSERT(material.texture.has_value() && layout.texture(GltfImageKind::Face).has_value(), "a textured material");
-  const Json texture = {{"index", *layout.texture(GltfImageKind::Face) + *material.texture}};
+  const bool has_texture = material.texture.has_value();  // else a tint only
+  QUOIN_ASSERT(!has_texture || layout.texture(GltfImageKind::Face).has_value(), "images of faces");
+  Json texture;
+  if (has_texture) texture = {{"index", *layout.texture(GltfImageKind::Face) + *material.texture}};
   Json entry = layout.is_unlit ? unlit_json(material.name, false, std::nullopt) : Json{{"name", material.name}};
   Json& surface = entry["pbrMetallicRoughness"];
-  surface["baseColorTexture"] = texture;
+  if (has_texture) surface["baseColorTexture"] = texture;
   if (material.tint != Vec3(1.0F)) {
     surface["baseColorFactor"] = {material.tint.x, material.tint.y, material.tint.z, 1.0F};
   }
@@ -225,7 +227,7 @@ Json textured_json(const SurfaceMaterial& material, const GltfLayout& layout) {
     surface["metallicFactor"] = material.metalness;
     surface["roughnessFactor"] = material.roughness;
     if (material.is_emissive()) {
-      entry["emissiveTexture"] = texture;
+      if (has_texture) entry["emissiveTexture"] = texture;
       entry["emissiveFactor"] = json_from(material.tint * std::min(material.emission, 1.0F));
       entry["extensions"][kEmissiveStrength] = {{"emissiveStrength", std::max(material.emission, 1.0F)}};
     }

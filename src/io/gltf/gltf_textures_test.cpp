@@ -12,6 +12,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include "grid/shapes/shapes_for_tests.h"
 #include "io/gltf/gltf_for_tests.h"
 
 namespace quoin {
@@ -115,7 +116,7 @@ class GltfTextures : public Gltf {
           at += DVec3(positions[corner[k]]) * shares[k];
           for (std::size_t c = 0; c < 2; ++c) st[c] += double{uv[corner[k]][c]} * shares[k];
         }
-        const IVec3 voxel = voxel_of(at - DVec3(normal_of(direction)) * 0.5);
+        const IVec3 voxel = voxel_of(at - DVec3(normal_of(direction)) * 0.02);  // faces of shapes lie inside, too
         const VoxelProperties& type = scene_.types[grid.get(voxel)];
         if (type.faces.empty()) {
           ADD_FAILURE() << "a texture on " << type.name;
@@ -131,7 +132,8 @@ class GltfTextures : public Gltf {
         const std::size_t row = texel(st[1], image.height) * image.width;
         const std::uint8_t* pixel = image.pixels.data() + 4 * (row + texel(st[0], image.width));
         const Vec3 shown = linear_colour(Rgba8{pixel[0], pixel[1], pixel[2]}) * factor;
-        const auto expected = texel_at(type.faces[direction], direction, at - DVec3(voxel), 0);
+        const AxisOrientation turn = type.orientations.of(grid.data(voxel).state);
+        const auto expected = texel_at(turned_face(type.faces, direction, turn), direction, at - DVec3(voxel), 0);
         const Vec3 wanted(expected[0], expected[1], expected[2]);
         // An atlas has the tints, rounded to bytes.
         const bool is_rounded = factor == Vec3(1.0F) && Rgba8{pixel[0], pixel[1], pixel[2]} == srgb_colour(wanted);
@@ -156,6 +158,38 @@ TEST_F(GltfTextures, RepeatOnMergedFaces) {
       const ParsedGlb glb = write(BlockyMeshOptions{.watertight = watertight});
       EXPECT_GT(expect_faces(glb, grid), 1'000) << "seed " << seed;
     }
+  }
+}
+
+TEST_F(GltfTextures, TurnWithStatesAndCoverShapes) {
+  for (const bool watertight : {false, true}) {
+    scene_ = {};
+    Grid grid = random_grid(4);
+    StateOrientations all;
+    for (int i = 0; i < AxisOrientation::kCount; ++i) all.by_value.push_back(AxisOrientation::at(i));
+    const VoxelFaces faces = scene_.types[1].faces;  // six different ones
+    const auto turns = StateOrientations::about_y_and_upside_down();
+    const std::array<VoxelType, 3> types = {add({.name = "cube", .state_bits = 6, .faces = faces, .orientations = all}),
+                                            add({.name = "slab",
+                                                 .state_bits = 3,
+                                                 .faces = faces,
+                                                 .orientations = turns,
+                                                 .shapes = shapes_for_tests::slab()}),
+                                            add({.name = "stairs",
+                                                 .state_bits = 3,
+                                                 .faces = faces,
+                                                 .orientations = turns,
+                                                 .shapes = shapes_for_tests::stairs()})};
+    std::mt19937 random(4);
+    for (int i = 0; i < 900; ++i) {
+      const auto part = [&] { return static_cast<int>(random() % 40) - 20; };
+      const std::size_t which = random() % 3;
+      grid.set({part(), part() / 4, part()}, types[which],
+               {.state = static_cast<std::uint32_t>(random() % (which == 0 ? 48 : 8))});
+    }
+    add_grid(grid);
+    const ParsedGlb glb = write(BlockyMeshOptions{.watertight = watertight});
+    EXPECT_GT(expect_faces(glb, grid), 10'000);
   }
 }
 

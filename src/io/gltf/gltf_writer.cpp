@@ -59,7 +59,15 @@ void for_normals(const VertexTransform& transform, const MeshView& view, const P
   QUOIN_ASSERT(view.directions.size() == view.positions.size(), "a direction for each vertex");
   auto normals = transform.face_normals();
   for (Vec3& normal : normals) normal += 0.0F;  // no -0
-  for (const Direction direction : view.directions) put(normals[static_cast<std::size_t>(direction)]);
+  if (view.looks.empty()) {
+    for (const Direction direction : view.directions) put(normals[static_cast<std::size_t>(direction)]);
+    return;
+  }
+  for (std::size_t i = 0; i < view.directions.size(); ++i) {
+    const Vec3& own = view.looks[i].normal;
+    const Vec3& of_side = normals[static_cast<std::size_t>(view.directions[i])];
+    put(own == Vec3(0.0F) ? of_side : Vec3(transform.normal(own)) + 0.0F);
+  }
 }
 
 void write_normals(const VertexTransform& transform, const MeshView& view, GltfComponent component, BlockWriter& out) {

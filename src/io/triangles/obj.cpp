@@ -573,6 +573,7 @@ class FaceImages {
  public:
   FaceImages(std::shared_ptr<const MaterialPalette> palette, const ObjNames& names) : palette_(std::move(palette)) {
     for (const SurfaceMaterial& material : palette_->textured_materials()) {
+      if (!material.texture) continue;  // a tint only
       add(colour_of(material), names.texture_stem);
       if (material.alpha != FaceAlpha::Opaque) add(alpha_of(material), names.alpha_stem);
     }
@@ -632,8 +633,13 @@ class FaceImages {
   std::size_t alphas_ = 0;
 };
 
-/// Returns a material of textured faces. Its image has the tint.
+/// Returns a material of textured faces, or of faces with a tint only. An image has the tint.
 std::string mtl_textured(const SurfaceMaterial& material, const std::string& name, const FaceImages& images) {
+  if (!material.texture) {
+    std::string colour;
+    for (int i = 0; i < 3; ++i) colour.append(" ").append(shortest(material.tint[i]));
+    return "\nnewmtl " + name + "\nKa 0 0 0\nKd" + colour + "\nKs 0 0 0\nillum 1\n";
+  }
   const std::string image = images.colour_file(material);
   std::string text = "\nnewmtl " + name + "\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd " + image + "\n";
   if (material.alpha != FaceAlpha::Opaque) text.append("map_d " + images.alpha_file(material) + "\n");
@@ -724,6 +730,7 @@ class ObjText {
   void write_blocks(const MeshPart& part, const VertexTransform& transform) {
     const MaterialSurfaces split(part, palette_);
     write_face_normals(transform);
+    std::uint64_t first_inclined = kDirections.size();  // the next normal of the object
     for (const auto& [view, material] : split.surfaces()) {
       write_vertices(view, transform);
       out_.put_text("usemtl " + mtl_name(palette_, material) + "\n");
@@ -731,15 +738,29 @@ class ObjText {
       if (palette_.is_textured(material)) of_faces = palette_.face_coordinates(view);
       const std::span<const std::array<float, 2>> own = of_faces.empty() ? view.atlas : of_faces;
       for (const std::array<float, 2>& uv : own) write_texture_coordinate(uv);
-      write_faces(view, transform.mirrors(), [&view = view, own, this](std::uint32_t corner) {
+      const std::uint64_t inclined = write_inclined_normals(view, transform);
+      write_faces(view, transform.mirrors(), [&view = view, own, first_inclined, this](std::uint32_t corner) {
         QUOIN_ASSERT(corner < view.types.size() && corner < view.directions.size(), "a vertex of the surface");
         const std::uint64_t texture = own.empty() ? view.types[corner] : textures_ + corner + 1;
-        return std::pair(static_cast<std::uint64_t>(view.directions[corner]), texture);
+        const bool is_inclined = !view.looks.empty() && view.looks[corner].normal != Vec3(0.0F);
+        return std::pair(is_inclined ? first_inclined + corner : static_cast<std::uint64_t>(view.directions[corner]),
+                         texture);
       });
       vertices_ += view.positions.size();
       textures_ += own.size();
+      first_inclined += inclined;
     }
-    normals_ += kDirections.size();
+    normals_ += first_inclined;
+  }
+
+  /// Writes a normal per vertex if any is of an inclined face. Returns the number of normals.
+  std::uint64_t write_inclined_normals(const MeshView& view, const VertexTransform& transform) {
+    if (std::ranges::all_of(view.looks, [](const VertexLook& look) { return look.normal == Vec3(0.0F); })) return 0;
+    for (std::size_t i = 0; i < view.positions.size() && !out_.failed(); ++i) {
+      lines_.triple("vn", transform.normal(normal_at(view, i)));
+      out_.put('\n');
+    }
+    return view.positions.size();
   }
 
   void write_face_normals(const VertexTransform& transform) {

@@ -412,21 +412,25 @@ std::string header_of(const Counts& counts, OcclusionIn occlusion, const DVec3& 
   return text + "property list uchar int vertex_indices\nend_header\n";
 }
 
-/// The colours of all types at every occlusion, [type * kOcclusions + occlusion].
-std::vector<Srgb> colours_of(const VoxelRegistry& types) {
+/// Appends a colour at every occlusion.
+void append_colours(Rgba8 colour, std::vector<Srgb>& colours) {
   const SrgbEncoder& encode = SrgbEncoder::shared();
   // Rounded through 16 bits, like the colours of smooth meshes.
   const auto darkened = [&](std::uint8_t byte, std::uint8_t occlusion) {
     const auto linear = static_cast<std::uint16_t>(std::lround(linear_from_srgb(byte) * 65'535.0F));
     return encode(static_cast<float>(linear) / 65'535.0F * occlusion_brightness(occlusion));
   };
+  for (std::uint8_t occlusion = 0; occlusion < kOcclusions; ++occlusion) {
+    colours.push_back({darkened(colour.r, occlusion), darkened(colour.g, occlusion), darkened(colour.b, occlusion)});
+  }
+}
+
+/// The colours of all types at every occlusion, [type * kOcclusions + occlusion].
+std::vector<Srgb> colours_of(const VoxelRegistry& types) {
   std::vector<Srgb> colours;
   colours.reserve(types.size() * kOcclusions);
   for (std::size_t type = 0; type < types.size(); ++type) {
-    const Rgba8 colour = types[static_cast<VoxelType>(type)].colour;
-    for (std::uint8_t occlusion = 0; occlusion < kOcclusions; ++occlusion) {
-      colours.push_back({darkened(colour.r, occlusion), darkened(colour.g, occlusion), darkened(colour.b, occlusion)});
-    }
+    append_colours(types[static_cast<VoxelType>(type)].colour, colours);
   }
   return colours;
 }
@@ -453,12 +457,19 @@ void write_vertices(const MeshView& view, const VertexTransform& transform, cons
   }
   const auto normals = transform.face_normals();
   const bool is_darkened = !coloured.block_occlusion.empty();
+  std::vector<Srgb> tints;  // of faces of shapes without textures
+  for (const VoxelFace& face : view.faces) append_colours(face.tint, tints);
   for (std::size_t i = 0; i < view.positions.size() && !out.failed(); ++i) {
     QUOIN_ASSERT((view.types[i] + std::size_t{1}) * kOcclusions <= colours.size() &&
                      static_cast<std::size_t>(view.directions[i]) < normals.size(),
                  "a type and a direction with a colour and a normal");
-    put_vertex(Vec3(transform.position(view.positions[i])), normals[static_cast<std::size_t>(view.directions[i])],
-               colours[view.types[i] * kOcclusions + (is_darkened ? view.block_occlusion[i] : 0)], out);
+    const VertexLook look = view.looks.empty() ? VertexLook() : view.looks[i];
+    const bool is_tinted = look.face != 0 && view.faces[look.face - 1].texture.is_null();
+    const std::size_t colour = is_tinted ? look.face - std::size_t{1} : view.types[i];
+    const Vec3 normal = look.normal == Vec3(0.0F) ? normals[static_cast<std::size_t>(view.directions[i])]
+                                                  : Vec3(transform.normal(look.normal));
+    put_vertex(Vec3(transform.position(view.positions[i])), normal,
+               (is_tinted ? tints : colours)[colour * kOcclusions + (is_darkened ? view.block_occlusion[i] : 0)], out);
     if (is_apart) out.put(openness_at(view, i));
   }
 }

@@ -194,6 +194,7 @@ void make_blocky(const ChunkSurfaceOptions& options, SurfaceJob& job, SurfaceWor
   if (!workspace.blocky) workspace.blocky.emplace();
   QuadOptions wanted;
   wanted.merge = options.merge;
+  wanted.shapes = ShapeUse::Cubes;  // a surface has no place for shapes yet
   const VoxelRegistry& types = *job.types;
   workspace.blocky->mesh(job.voxels->neighbourhood(job.chunk), types, wanted, workspace.quads);
   if (workspace.quads.empty()) return;

@@ -250,7 +250,8 @@ QuadBuffer emissive_quads(const Grid& grid, const VoxelRegistry& types, IVec3 ch
   const Chunk* found = grid.find_chunk(chunk);
   if (found == nullptr || !has_emissive_types(*found, types)) return {};
   QuadBuffer quads;
-  mesher.mesh(grid.neighbourhood(chunk), types, {.merge = true, .bake_occlusion = false}, quads);
+  mesher.mesh(grid.neighbourhood(chunk), types, {.merge = true, .bake_occlusion = false, .shapes = ShapeUse::Cubes},
+              quads);
   std::erase_if(quads, [&](const Quad& quad) {
     return quad.type() >= types.size() || !types.is_opaque(quad.type()) || !(types[quad.type()].emission > 0.0F);
   });

@@ -93,6 +93,10 @@ Status check_atlas(const Scene& scene, const std::vector<GridHandle>& grids, con
     const bool is_near = bounds.empty() || (glm::all(glm::greaterThanEqual(bounds.min, IVec3(-kFarthestVoxel))) &&
                                             glm::all(glm::lessThanEqual(bounds.max, IVec3(kFarthestVoxel))));
     if (!is_near) return make_error(ErrorCode::LimitExceeded, "cannot make an atlas: voxel coordinates exceed 2^24");
+    const std::vector<VoxelType> types = scene.grids()[handle].grid.types();
+    if (std::ranges::any_of(types, [&](VoxelType type) { return scene.types.is_shaped(type); })) {
+      return make_error(ErrorCode::Unsupported, "cannot make an atlas: the scene has shapes within voxels");
+    }
   }
   return {};
 }
@@ -148,8 +152,10 @@ MeshPart with_atlas(MeshPart part, Coordinates coordinates) {
   for (MeshView& view : part.surfaces) {
     if (view.surface != SurfaceClass::Opaque) continue;
     QUOIN_ASSERT(owner->second.size() == view.positions.size(), "texture coordinates for each vertex");
-    view.atlas = owner->second;
+    view.atlas = owner->second;  // it has the colours of types, also of those whose state turns them
     view.block_occlusion = {};
+    view.looks = {};
+    view.faces = {};
   }
   part.owner = owner;
   return part;

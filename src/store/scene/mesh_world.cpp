@@ -272,6 +272,7 @@ class SpooledMesh {
       }
       std::vector<std::uint32_t> indices = from.indices;
       for (std::uint32_t& index : indices) index += static_cast<std::uint32_t>(to.vertices);
+      if (auto done = append_looks(from, to, folder); !done) return done;
       to.vertices += from.positions.size();
       for (const Status& done :
            {to.positions.append(from.positions, folder), to.directions.append(from.directions, folder),
@@ -282,8 +283,11 @@ class SpooledMesh {
     }
     return {};
   }
-  Status finish() {
+  Status finish(const std::filesystem::path& folder) {
     for (Surface& surface : surfaces_) {
+      if (surface.looked > 0) {
+        if (auto done = skip_looks(surface, folder); !done) return done;
+      }
       for (Spool* const spool : surface.all()) {
         if (auto done = spool->finish(); !done) return done;
       }
@@ -309,6 +313,8 @@ class SpooledMesh {
       view.directions = surface.directions.values<Direction>();
       view.types = surface.types.values<VoxelType>();
       view.block_occlusion = surface.occlusion.values<std::uint8_t>();
+      view.looks = surface.looks.values<VertexLook>();
+      view.faces = surface.faces;
     }
     return views;
   }
@@ -316,9 +322,34 @@ class SpooledMesh {
  private:
   struct Surface {
     std::uint64_t vertices = 0;
-    Spool positions, directions, occlusion, types, indices;
-    std::array<Spool*, 5> all() { return {&positions, &directions, &occlusion, &types, &indices}; }
+    std::uint64_t looked = 0;  // vertices in `looks`; 0 if none has a look of its own
+    Spool positions, directions, occlusion, types, indices, looks;
+    std::vector<VoxelFace> faces;
+    std::array<Spool*, 6> all() { return {&positions, &directions, &occlusion, &types, &indices, &looks}; }
   };
+
+  // Appends looks of vertices without any, so that all vertices have one.
+  static Status skip_looks(Surface& to, const std::filesystem::path& folder) {
+    const std::vector<VertexLook> none(to.vertices - to.looked);
+    to.looked = to.vertices;
+    return to.looks.append(none, folder);
+  }
+
+  // Appends the looks of new vertices, if any has one.
+  static Status append_looks(const BlockyTriangles& from, Surface& to, const std::filesystem::path& folder) {
+    if (from.looks.empty()) return {};
+    if (auto done = skip_looks(to, folder); !done) return done;
+    std::vector<std::uint32_t> numbers = {0};  // by VertexLook::face
+    for (const VoxelFace& face : from.faces) {
+      auto known = std::find(to.faces.begin(), to.faces.end(), face);
+      if (known == to.faces.end()) known = to.faces.insert(known, face);
+      numbers.push_back(static_cast<std::uint32_t>(known - to.faces.begin()) + 1);
+    }
+    std::vector<VertexLook> looks = from.looks;
+    for (VertexLook& look : looks) look.face = numbers[look.face];
+    to.looked += looks.size();
+    return to.looks.append(looks, folder);
+  }
 
   std::array<Surface, kSurfaceClasses> surfaces_;
   std::mutex mutex_;
@@ -474,7 +505,7 @@ class WorldMesher {
     if (!cache.status()) return cache.status().error();
     stats.faces_total += 6 * cache.voxels();
     count(cache);
-    if (auto done = spooled->finish(); !done) return of_folder(done.error());
+    if (auto done = spooled->finish(options_.folder); !done) return of_folder(done.error());
     MeshPart part{{}, spooled->views(), DVec3(-*origin * kChunkEdge), spooled};
     CachedReader reader(cache, *origin, threads_);
     part.thickness = glass_thickness([&](IVec3 voxel) { return reader.get(voxel); }, part.surfaces);
@@ -503,7 +534,9 @@ class WorldMesher {
     const auto window = window_around(batch, cache, threads_);
     if (!window) return window.error();
     if (cache.has_densities()) return densities();
+    const VoxelRegistry& types = loaded_.loaded.scene.types;
     std::vector<QuadBuffer> quads(batch.size());
+    std::vector<ShapeFaceBuffer> shapes(types.has_shapes() ? batch.size() : 0);
     const std::size_t tasks = std::min<std::size_t>(batch.size(), thread_count(threads_));
     parallel_for(tasks, threads_, [&](std::size_t task) {
       BlockyMesher mesher;
@@ -511,12 +544,17 @@ class WorldMesher {
       options.merge = options_.scene.mesh.merge;
       options.bake_occlusion = options_.scene.mesh.bake_occlusion;
       for (std::size_t i = task; i < batch.size(); i += tasks) {
-        mesher.mesh(window->neighbourhood(batch[i]), loaded_.loaded.scene.types, options, quads[i]);
+        const Neighbourhood near = window->neighbourhood(batch[i]);
+        if (shapes.empty()) {
+          mesher.mesh(near, types, options, quads[i]);
+        } else {
+          mesher.mesh(near, types, options, quads[i], shapes[i]);
+        }
       }
     });
     std::vector<IVec3> from_origin;
     for (const IVec3 chunk : batch) from_origin.push_back(chunk - origin);
-    return append_triangles(quads, from_origin, loaded_.loaded.scene.types, options_.scene.mesh.watertight, mesh);
+    return append_triangles(quads, from_origin, types, options_.scene.mesh.watertight, mesh, shapes);
   }
 
   const WorldStore& world_;

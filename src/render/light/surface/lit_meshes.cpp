@@ -19,6 +19,10 @@
 namespace quoin {
 namespace {
 
+bool is_of_shape(const MeshView& view, std::size_t vertex) {
+  return !view.looks.empty() && view.looks[vertex].is_shape;
+}
+
 constexpr std::size_t kAtOnce = 8'192;  // vertices; whole quads of blocks
 
 Status refused(const MeshPart& part, const char* why) {
@@ -48,12 +52,19 @@ class VertexLights {
     for (std::size_t i = 0; i < out.size(); ++i) out[i] = stored(levels[i], view.normals[begin + i], 0.0F);
   }
 
-  // Four vertices are the corners of a quad.
+  // Four vertices are the corners of a quad, except those of shapes.
   void light_blocks(SurfaceLight& surface, const MeshView& view, std::size_t begin, std::span<LinearRgba16> out) const {
     QUOIN_ASSERT(view.types.size() == view.positions.size() && view.directions.size() == view.positions.size(),
                  "a type and a direction for each vertex");
     for (std::size_t i = 0; i < out.size(); ++i) {
       const std::size_t vertex = begin + i;
+      if (is_of_shape(view, vertex)) {
+        const Vec3 normal = normal_at(view, vertex);
+        std::array<MeanLevels, 1> mean;
+        surface.read({{&view.positions[vertex], 1}, {&normal, 1}}, mean);
+        out[i] = stored(mean[0], normal, emission_of(view.types[vertex]));
+        continue;
+      }
       const std::size_t corner = vertex % 4;
       const Direction direction = view.directions[vertex];
       const FaceFrame& frame = frame_of(direction);
@@ -61,12 +72,12 @@ class VertexLights {
       if (frame.sign > 0) --voxel[frame.axis];
       if (corner == 1 || corner == 2) --voxel[frame.u];
       if (corner >= 2) --voxel[frame.v];
-      const VoxelType type = view.types[vertex];
-      const float emission = type < types_.size() ? types_[type].emission : 0.0F;
       const MeanLevels levels = levels_of_corner(surface.face(voxel, direction)[corner]);
-      out[i] = stored(levels, Vec3(normal_of(direction)), emission);
+      out[i] = stored(levels, Vec3(normal_of(direction)), emission_of(view.types[vertex]));
     }
   }
+
+  [[nodiscard]] float emission_of(VoxelType type) const { return type < types_.size() ? types_[type].emission : 0.0F; }
 
   [[nodiscard]] LinearRgba16 stored(const MeanLevels& levels, Vec3 normal, float emission) const {
     const Vec3 light = exposure_ * (light_colour(levels, normal, look_) + std::max(emission, 0.0F));
@@ -90,8 +101,11 @@ struct LitPart {
 
 bool are_corners_of_quads(const MeshView& view) {
   if (view.has_albedo()) return true;
-  if (view.positions.size() % 4 != 0 || view.indices.size() != view.positions.size() / 4 * 6) return false;
+  if (view.positions.size() % 4 != 0) return false;
+  // Shapes also have triangles, with a vertex that no index names.
+  if (view.looks.empty() && view.indices.size() != view.positions.size() / 4 * 6) return false;
   for (std::size_t i = 0; i < view.positions.size(); i += 4) {
+    if (is_of_shape(view, i)) continue;
     const FaceFrame& frame = frame_of(view.directions[i]);
     const Vec3 across = view.positions[i + 2] - view.positions[i];
     Vec3 along(0.0F);
