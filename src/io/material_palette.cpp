@@ -426,9 +426,6 @@ std::vector<std::array<float, 2>> MaterialPalette::face_coordinates(const MeshVi
   QUOIN_ASSERT(view.positions.empty() || face_of(view, 0) != nullptr, "textured faces");
   std::vector<std::array<float, 2>> coordinates(view.positions.size());
   face_writer_.write(view, Vec3(0.0F), std::as_writable_bytes(std::span(coordinates)));
-  for (std::size_t i = 0; i < view.looks.size(); ++i) {
-    if (view.looks[i].face != 0) coordinates[i] = view.looks[i].uv;
-  }
   if (has_face_atlas()) move_into_atlas(view, coordinates);
   return coordinates;
 }

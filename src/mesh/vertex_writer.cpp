@@ -356,19 +356,38 @@ VertexWriter::VertexWriter(VertexLayout layout, const VoxelRegistry& types, cons
     const bool is_tint = element.attribute == VertexAttribute::Tint;
     if (element.attribute != VertexAttribute::Colour && !is_tint) continue;
     colours_[i].reserve((is_tint ? 6 : 1) * types.size() + 1);
-    for (std::size_t type = 0; type < types.size(); ++type) {
-      const VoxelProperties& properties = types[static_cast<VoxelType>(type)];
-      if (!is_tint) colours_[i].push_back(encoded(properties.colour, element.format));
-      for (const Direction direction : kDirections) {
-        if (!is_tint) break;
-        Rgba8 tint = properties.colour;
-        if (!properties.faces.empty()) tint = properties.faces[direction].tint;
-        colours_[i].push_back(encoded(tint, element.format));
+    if (is_tint) {
+      for_each_face(types, [&](const VoxelFace* face, const VoxelProperties& type) {
+        colours_[i].push_back(encoded(face == nullptr ? type.colour : face->tint, element.format));
+      });
+    } else {
+      for (std::size_t type = 0; type < types.size(); ++type) {
+        colours_[i].push_back(encoded(types[static_cast<VoxelType>(type)].colour, element.format));
       }
     }
     colours_[i].push_back(encoded(Rgba8{255, 255, 255, 255}, element.format));
   }
   read_faces(types, textures);
+}
+
+template <class Visit>
+void VertexWriter::for_each_face(const VoxelRegistry& types, const Visit& visit) {
+  for (std::size_t type = 0; type < types.size(); ++type) {
+    const VoxelProperties& properties = types[static_cast<VoxelType>(type)];
+    for (const Direction direction : kDirections) {
+      visit(properties.faces.empty() ? nullptr : &properties.faces[direction], properties);
+    }
+  }
+  for (std::size_t type = 0; type < types.size(); ++type) {
+    const VoxelProperties& properties = types[static_cast<VoxelType>(type)];
+    if (properties.orientations.empty() || properties.faces.empty()) continue;
+    for (int i = 0; i < AxisOrientation::kCount; ++i) {
+      for (const Direction direction : kDirections) {
+        const VoxelFace face = turned_face(properties.faces, direction, AxisOrientation::at(i));
+        visit(&face, properties);
+      }
+    }
+  }
 }
 
 void VertexWriter::read_faces(const VoxelRegistry& types, const TextureSet& textures) {
@@ -377,25 +396,32 @@ void VertexWriter::read_faces(const VoxelRegistry& types, const TextureSet& text
                                [&](const VertexElement& each) { return each.attribute == attribute; });
   };
   if (!types.has_textures()) return;
-  if (has(VertexAttribute::Texture)) textures_.assign(6 * types.size(), ~std::uint32_t{0});
-  if (has(VertexAttribute::TextureUv)) turns_.assign(6 * types.size(), 0);
-  for (std::size_t type = 1; type < types.size(); ++type) {
-    const VoxelFaces& faces = types[static_cast<VoxelType>(type)].faces;
-    if (faces.empty()) continue;
-    for (const Direction direction : kDirections) {
-      const VoxelFace& face = faces[direction];
-      const std::size_t number = face_number(static_cast<VoxelType>(type), direction);
-      if (!turns_.empty()) turns_[number] = static_cast<std::uint8_t>(face.turn + (face.mirrored ? 4 : 0));
-      const auto layer = textures_.empty() ? std::nullopt : textures.find(face.texture);
-      if (layer && layer->array <= 0xFFFFU && layer->layer <= 0xFFFFU) {
-        textures_[number] = layer->array << 16 | layer->layer;
-      }
+  if (types.has_turned_by_state()) {
+    turned_.assign(types.size(), 0);
+    std::size_t next = 6 * types.size();
+    for (std::size_t type = 1; type < types.size(); ++type) {
+      const VoxelProperties& properties = types[static_cast<VoxelType>(type)];
+      if (properties.orientations.empty() || properties.faces.empty()) continue;
+      turned_[type] = next;
+      next += std::size_t{6} * AxisOrientation::kCount;
     }
   }
+  const bool has_textures = has(VertexAttribute::Texture);
+  const bool has_turns = has(VertexAttribute::TextureUv);
+  for_each_face(types, [&](const VoxelFace* face, const VoxelProperties& /*type*/) {
+    if (has_turns) {
+      turns_.push_back(face == nullptr ? std::uint8_t{0}
+                                       : static_cast<std::uint8_t>(face->turn + (face->mirrored ? 4 : 0)));
+    }
+    if (!has_textures) return;
+    const auto layer = face == nullptr ? std::nullopt : textures.find(face->texture);
+    const bool fits = layer && layer->array <= 0xFFFFU && layer->layer <= 0xFFFFU;
+    textures_.push_back(fits ? layer->array << 16 | layer->layer : ~std::uint32_t{0});
+  });
 }
 
 std::array<std::array<float, 2>, 4> VertexWriter::texture_uvs(const Quad& quad) const {
-  const TextureFrame& frame = texture_frames()[face_of(quad.direction())][turn(quad.type(), quad.direction())];
+  const TextureFrame& frame = texture_frames()[face_of(quad.direction())][turn(face_number(quad))];
   const std::array<IVec3, 4> corners = corners_of(quad);
   std::array<std::array<float, 2>, 4> coordinates{};
   for (std::size_t i = 0; i < corners.size(); ++i) {
@@ -408,8 +434,12 @@ std::vector<std::array<float, 2>> VertexWriter::texture_uvs(const MeshView& mesh
   const std::vector<Vec3> corners = corners_of_faces(mesh);
   std::vector<std::array<float, 2>> coordinates(corners.size());
   for (std::size_t i = 0; i < corners.size(); ++i) {
+    if (!mesh.looks.empty() && mesh.looks[i].face != 0) {
+      coordinates[i] = mesh.looks[i].uv;
+      continue;
+    }
     const Direction direction = mesh.directions[i];
-    const TextureFrame& frame = texture_frames()[face_of(direction)][turn(mesh.types[i], direction)];
+    const TextureFrame& frame = texture_frames()[face_of(direction)][turn(face_number(mesh.types[i], direction))];
     coordinates[i] = texture_coordinates(frame, mesh.positions[i] - corners[i]);
   }
   return coordinates;
@@ -449,15 +479,13 @@ void VertexWriter::write_element(std::size_t index, std::span<const Quad> quads,
     case VertexAttribute::Uv:
       return put_uvs(format, quads, column);
     case VertexAttribute::Texture:
-      return put_numbers(format,
-                         PerQuad{column, quads, [&](Quad quad) { return texture(quad.type(), quad.direction()); }});
+      return put_numbers(format, PerQuad{column, quads, [&](Quad quad) { return texture(face_number(quad)); }});
     case VertexAttribute::TextureUv:
       return PerCorner{column, quads, [&](Quad quad) { return texture_uvs(quad); }}.put<std::array<float, 2>>(
           [](const std::array<float, 2>& uv) { return uv; });
     case VertexAttribute::Tint:
-      return put_encoded(format, PerQuad{column, quads, [&](Quad quad) -> const Colour& {
-                                           return colour(index, face_number(quad.type(), quad.direction()));
-                                         }});
+      return put_encoded(
+          format, PerQuad{column, quads, [&](Quad quad) -> const Colour& { return colour(index, face_number(quad)); }});
   }
 }
 
@@ -523,8 +551,9 @@ void VertexWriter::write_element(std::size_t index, const MeshView& mesh, std::s
     case VertexAttribute::Type:
       return put_numbers(format, vertices([&](auto i) { return mesh.types[first + i]; }));
     case VertexAttribute::Texture:
-      return put_numbers(format,
-                         vertices([&](auto i) { return texture(mesh.types[first + i], mesh.directions[first + i]); }));
+      return put_numbers(format, vertices([&](auto i) {
+                           return texture(face_number(mesh.types[first + i], mesh.directions[first + i]));
+                         }));
     case VertexAttribute::Tint:
       return put_encoded(format, vertices([&](auto i) -> const Colour& {
                            return colour(index, face_number(mesh.types[first + i], mesh.directions[first + i]));

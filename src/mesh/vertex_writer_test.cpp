@@ -144,7 +144,11 @@ VoxelRegistry textured_types() {
 }
 
 TEST(VertexWriter, WritesTexturesOfFaces) {
-  const VoxelRegistry types = textured_types();
+  VoxelRegistry types = textured_types();
+  StateOrientations turns;
+  for (int i = 0; i < AxisOrientation::kCount; ++i) turns.by_value.push_back(AxisOrientation::at(i));
+  const VoxelType turned =
+      types.add({.name = "turned", .state_bits = 6, .faces = types[2].faces, .orientations = turns}).value();
   TextureSet textures;
   textures.add(types);
   ASSERT_EQ(textures.arrays().size(), 2U);
@@ -160,8 +164,11 @@ TEST(VertexWriter, WritesTexturesOfFaces) {
   for (int i = 0; i < 60; ++i) {
     const IVec3 low(random() % 40, random() % 40, random() % 40);
     grid.fill_box({low, low + IVec3(1 + random() % 9, 1 + random() % 5, 1 + random() % 7)},
-                  static_cast<VoxelType>(random() % 6));  // 5 is not registered
+                  static_cast<VoxelType>(random() % 7));  // 6 is not registered
   }
+  for (int i = 0; i < 300; ++i)
+    grid.set(IVec3(random() % 40, random() % 40, random() % 40), turned,
+             {.state = static_cast<std::uint32_t>(random() % 48)});
   QuadBuffer quads;
   BlockyMesher().mesh(grid.neighbourhood({0, 0, 0}), types, {}, quads);
   std::vector<std::byte> bytes(writer.bytes_needed(vertices_needed(quads.size())));
@@ -172,8 +179,8 @@ TEST(VertexWriter, WritesTexturesOfFaces) {
     const auto number = read<std::uint32_t>(bytes, at);
     const auto tint = read<Rgba8>(bytes, at + 12);
     VoxelFace face;
-    if (quad.type() < 4) {
-      face = types[quad.type()].faces[quad.direction()];
+    if (quad.type() < 4 || quad.type() == turned) {
+      face = turned_face(types[quad.type()].faces, quad.direction(), quad.orientation());
       ASSERT_EQ(textures[(TextureLayer{number >> 16, number & 0xFFFF})], face.texture);
       ASSERT_EQ(tint, (Rgba8{face.tint.r, face.tint.g, face.tint.b, 255}));
     } else {

@@ -163,8 +163,7 @@ class VertexWriter {
   [[nodiscard]] std::uint32_t texture(std::size_t face) const {
     return face < textures_.size() ? textures_[face] : ~std::uint32_t{0};
   }
-  [[nodiscard]] std::uint8_t turn(VoxelType type, Direction direction) const {
-    const std::size_t number = face_number(type, direction);
+  [[nodiscard]] std::uint8_t turn(std::size_t number) const {
     return number < turns_.size() ? turns_[number] : std::uint8_t{0};
   }
   [[nodiscard]] std::array<std::array<float, 2>, 4> texture_uvs(const Quad& quad) const;
