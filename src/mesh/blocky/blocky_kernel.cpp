@@ -171,23 +171,36 @@ void end_at_border(const SlabRange& range, Scratch& s) {
   }
 }
 
-// Finds the shaped voxels of the region and around it, by the layers of opaque voxels.
-void find_shapes(const Job& whole, Scratch& s) {
+// Finds the shaped voxels around the chunk, and in it if there are transparent cubes, too: with the passes that find
+// opaque voxels.
+void find_shapes_around(const Job& whole, Scratch& s) {
   Job job = whole;
   job.by = LayerClass::Shape;
-  const SlabRange range = slabs_around(job.region);
   ShapedVoxels& shapes = *job.shapes;
-  if (shapes.is_in_centre) {
-    fill_layers(job, range, s);
+  if (shapes.is_in_centre && shapes.has_transparent_cubes) fill_layers(job, slabs_around(job.region), s);
+  const bool has_ends = gather_border(job, s);
+  shapes.rows = s.z.opaque;
+  if (has_ends) {
+    shapes.ends = s.z.ends;
   } else {
+    __builtin_memset(shapes.ends.words, 0, sizeof(shapes.ends.words));
+  }
+}
+
+// Lists all shaped voxels of the region and around it. Requires: the layers of the chunk are filled.
+void list_all_shapes(const Job& job, Scratch& s) {
+  ShapedVoxels& shapes = *job.shapes;
+  if (!shapes.is_in_centre || !shapes.has_transparent_cubes) {
+    const Words mask = Words{} - std::uint64_t{shapes.is_in_centre};
+    const SlabRange range = slabs_around(job.region);
     for (int z = range.z.begin; z < range.z.end; ++z) {
-      for (int y = range.y.begin; y < range.y.end; y += kLanes) store(s.z.opaque.words + word_index(z, y), Words{});
+      for (int y = range.y.begin; y < range.y.end; y += kLanes) {
+        const int at = word_index(z, y);
+        store(shapes.rows.words + at, load(s.solid.words + at) & ~load(s.z.opaque.words + at) & mask);
+      }
     }
   }
-  const bool has_ends = gather_border(job, s);
-  shapes.cells = s.z.opaque;
-  if (has_ends) shapes.ends = s.z.ends;
-  list_shapes(job, has_ends);
+  list_shapes(job);
 }
 
 // Finds the visible faces of cubes: shaped voxels have none in these layers, and hide those that they cover.
@@ -195,7 +208,7 @@ void find_faces_of_cubes(const Job& job, bool row_ends, Scratch& s) {
   for (int z = job.region.min.z; z < job.region.max.z; ++z) {
     for (int y = rounded_down(job.region.min.y); y < job.region.max.y; y += kLanes) {
       const int at = word_index(z, y);
-      store(s.solid.words + at, load(s.solid.words + at) & ~load(job.shapes->cells.words + at));
+      store(s.solid.words + at, load(s.solid.words + at) & ~load(job.shapes->rows.words + at));
     }
   }
   find_faces_of_all_types(job, row_ends, s);
@@ -203,10 +216,11 @@ void find_faces_of_cubes(const Job& job, bool row_ends, Scratch& s) {
 }
 
 void find_all_faces(const Job& job, Scratch& s) {
-  if (job.shapes != nullptr) find_shapes(job, s);
+  if (job.shapes != nullptr) find_shapes_around(job, s);
   const SlabRange range = slabs_around(job.region);
   fill_layers(job, range, s);
   end_at_border(range, s);
+  if (job.shapes != nullptr) list_all_shapes(job, s);
   const bool row_ends = gather_border(job, s);
   if (job.shapes != nullptr) return find_faces_of_cubes(job, row_ends, s);
   find_faces_of_all_types(job, row_ends, s);
@@ -271,10 +285,11 @@ void mesh_chunk(const Job& whole, Scratch& s, QuadBuffer& out) {
   Job job = whole;
   const TypeSource types = find_types(*job.chunks->centre(), s);
   job.one_type = types.log_bits == kOneType && !job.has_transparent;
-  if (job.shapes != nullptr) find_shapes(job, s);
+  if (job.shapes != nullptr) find_shapes_around(job, s);
   const SlabRange range = slabs_around(job.region);
   fill_layers(job, range, s);
   if (!job.one_type) end_at_border(range, s);
+  if (job.shapes != nullptr) list_all_shapes(job, s);
   bool row_ends = gather_border(job, s);
   job.region = above_solid_floor(job, row_ends, s);
   if (job.region.empty()) return;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <bitset>
 #include <cstring>
 #include <map>
 #include <memory>
@@ -183,12 +184,37 @@ bool holds_shapes(const Chunk* chunk, const VoxelRegistry& types) {
   return false;
 }
 
-// Distances from a voxel to its 26 neighbours and itself in ShapedVoxels::octants, by Neighbourhood::index.
-constexpr std::array<int, 32> kOctantOffsets = [] {
+// Returns true if a chunk may have transparent voxels that are cubes.
+bool holds_transparent_cubes(const Chunk& chunk, const VoxelRegistry& types) {
+  const ChunkStorage* voxels = ChunkStorage::of(chunk);
+  if (voxels == nullptr) return types.is_transparent(*chunk.uniform()) && !types.is_shaped(*chunk.uniform());
+  if (voxels->direct()) return true;
+  for (std::size_t i = 0; i < voxels->palette.size(); ++i) {
+    const VoxelType type = voxels->palette[i];
+    if (voxels->counts[i] != 0 && types.is_transparent(type) && !types.is_shaped(type)) return true;
+  }
+  return false;
+}
+
+// Returns true if the state may turn cubes of a chunk.
+bool holds_turned_cubes(const Chunk& chunk, const VoxelRegistry& types) {
+  if (!types.has_turned_by_state()) return false;
+  const ChunkStorage* voxels = ChunkStorage::of(chunk);
+  if (voxels == nullptr) return types.is_turned_by_state(*chunk.uniform());
+  if (voxels->direct()) return true;
+  for (std::size_t i = 0; i < voxels->palette.size(); ++i) {
+    const VoxelType type = voxels->palette[i];
+    if (voxels->counts[i] != 0 && types.is_turned_by_state(type) && !types.is_shaped(type)) return true;
+  }
+  return false;
+}
+
+// Distances from a voxel to its 26 neighbours and itself in ShapedVoxels::cells, by Neighbourhood::index.
+constexpr std::array<int, 32> kCellOffsets = [] {
   std::array<int, 32> offsets{};
   for (int i = 0; i < 27; ++i) {
     const auto at = static_cast<std::size_t>(i);
-    offsets[at] = ((i / 9 - 1) * ShapedVoxels::kEdge + i / 3 % 3 - 1) * ShapedVoxels::kOctantStride + i % 3 - 1;
+    offsets[at] = ((i / 9 - 1) * ShapedVoxels::kEdge + i / 3 % 3 - 1) * ShapedVoxels::kCellStride + i % 3 - 1;
   }
   return offsets;
 }();
@@ -208,15 +234,18 @@ const std::array<CornerOccluders, 6>& cube_occluders() {
   return all;
 }
 
-// Returns the occlusion of a face of a voxel, two bits per corner. `octants`: of the voxel.
-unsigned occlusion_of(const CornerOccluders& occluders, const std::uint8_t* octants) {
-  const auto is_filled = [&](std::uint8_t number) {
-    return (octants[kOctantOffsets[number >> 3U]] >> (number & 7U) & 1U) != 0;
+// Returns the occlusion of a face of a voxel, two bits per corner. `cell`: of the voxel.
+inline unsigned occlusion_of(const CornerOccluders& occluders, const ShapedVoxels::Cell* cell) {
+  const auto filled = [&](std::uint8_t number) -> unsigned {
+    return cell[kCellOffsets[number >> 3U]] >> (number & 7U) & 1U;
   };
   unsigned bits = 0;
   for (std::size_t i = 0; i < 4; ++i) {
     const auto& [side1, side2, diagonal] = occluders[i];
-    bits |= unsigned{vertex_occlusion(is_filled(side1), is_filled(side2), is_filled(diagonal))} << 2 * i;
+    const unsigned a = filled(side1);
+    const unsigned b = filled(side2);
+    // vertex_occlusion without branches.
+    bits |= (a + b + (filled(diagonal) | (a & b))) << 2 * i;
   }
   return bits;
 }
@@ -227,52 +256,58 @@ FaceOcclusion unpacked_occlusion(unsigned bits) {
   return corners;
 }
 
-void fill_octants_of_row(std::uint64_t row, std::uint64_t ends, std::uint8_t* out) {
-  static const std::array<std::uint64_t, 256> spread = [] {
-    std::array<std::uint64_t, 256> made{};
-    for (std::uint64_t bits = 0; bits < 256; ++bits) {
-      for (unsigned i = 0; i < 8; ++i) made[bits] |= (bits >> i & 1U) * (std::uint64_t{0xFF} << 8 * i);
+void fill_cells_of_row(std::uint64_t row, std::uint64_t ends, ShapedVoxels::Cell* out) {
+  constexpr std::array<std::uint64_t, 16> kSpread = [] {
+    std::array<std::uint64_t, 16> made{};
+    for (std::size_t bits = 0; bits < made.size(); ++bits) {
+      for (unsigned i = 0; i < 4; ++i) made[bits] |= (bits >> i & 1U) * (std::uint64_t{ShapedVoxels::kCube} << 16 * i);
     }
     return made;
   }();
-  for (std::size_t i = 0; i < 8; ++i) std::memcpy(out + 8 * i, &spread[row >> 8 * i & 0xFF], 8);
-  out[-1] = static_cast<std::uint8_t>(0 - (ends >> 63));
-  out[kChunkEdge] = static_cast<std::uint8_t>(0 - (ends & 1));
+  if (row == 0) {
+    std::memset(out, 0, kChunkEdge * sizeof(*out));
+  } else {
+    for (std::size_t i = 0; i < 16; ++i) std::memcpy(out + 4 * i, &kSpread[row >> 4 * i & 15], 8);
+  }
+  out[-1] = (ends >> 63) != 0 ? ShapedVoxels::kCube : 0;
+  out[kChunkEdge] = (ends & 1) != 0 ? ShapedVoxels::kCube : 0;
 }
 
-// Fills the octants of all voxels within two of shaped ones.
-void fill_octants(const Job& job, bool row_ends, const Scratch& s) {
+// Fills the cells of all voxels within two of shaped ones.
+void fill_cells(const Job& job, bool row_ends, const Scratch& s) {
   ShapedVoxels& shapes = *job.shapes;
-  shapes.octants.resize(ShapedVoxels::kRows * ShapedVoxels::kOctantStride);
-  std::array<bool, ShapedVoxels::kRows> is_filled{};
-  const auto fill_around = [&](int y0, int z0) {
-    for (int z = std::max(z0 - 2, -1); z <= std::min(z0 + 2, kChunkEdge); ++z) {
-      for (int y = std::max(y0 - 2, -1); y <= std::min(y0 + 2, kChunkEdge); ++y) {
-        if (std::exchange(is_filled[ShapedVoxels::row_of(y, z)], true)) continue;
-        const auto at = static_cast<std::size_t>(word_index(z, y));
-        fill_octants_of_row(s.z.opaque.words[at], row_ends ? s.z.ends.words[at] : 0,
-                            &shapes.octants[ShapedVoxels::octants_at({0, y, z})]);
-      }
-    }
-  };
-  const ShapedVoxel* last = nullptr;
+  shapes.cells.resize(ShapedVoxels::kRows * ShapedVoxels::kCellStride);
+  // By z: bit y + 1 of each row with shaped voxels within two rows.
+  using Mask = std::bitset<ShapedVoxels::kEdge>;
+  std::array<Mask, ShapedVoxels::kEdge + 4> near{};
   for (const ShapedVoxel& voxel : shapes.voxels) {
-    if (last == nullptr || last->local.y != voxel.local.y || last->local.z != voxel.local.z) {
-      fill_around(voxel.local.y, voxel.local.z);
+    near[static_cast<std::size_t>(voxel.local.z + 3)].set(static_cast<std::size_t>(voxel.local.y + 1));
+  }
+  for (Mask& rows : near) rows |= rows << 1 | rows << 2 | rows >> 1 | rows >> 2;
+  for (int z = -1; z <= kChunkEdge; ++z) {
+    const Mask* const around = &near[static_cast<std::size_t>(z + 3)];
+    const Mask rows = around[-2] | around[-1] | around[0] | around[1] | around[2];
+    for (int y = -1; y <= kChunkEdge && rows.any(); ++y) {
+      if (!rows[static_cast<std::size_t>(y + 1)]) continue;
+      const auto at = static_cast<std::size_t>(word_index(z, y));
+      fill_cells_of_row(s.z.opaque.words[at], row_ends ? s.z.ends.words[at] : 0,
+                        &shapes.cells[ShapedVoxels::cell_at({0, y, z})]);
     }
-    last = &voxel;
   }
   for (const ShapedVoxel& voxel : shapes.voxels) {
-    if (voxel.darkens) shapes.octants[ShapedVoxels::octants_at(voxel.local)] = voxel.model->filled_octants;
+    unsigned cell = ShapedVoxels::kShaped;
+    if (voxel.is_opaque) cell |= voxel.model->filled_octants | unsigned{voxel.covered} << ShapedVoxels::kCoveredShift;
+    shapes.cells[ShapedVoxels::cell_at(voxel.local)] = static_cast<ShapedVoxels::Cell>(cell);
   }
-  shapes.has_octants = true;
+  shapes.has_cells = true;
 }
 
 // The faces around a voxel whose corners it may darken.
 struct DarkenedFaces {
-  // Of the eight faces of a direction around the voxel, those that touch one of some octants, as bits by [octants].
+  // The faces that touch one of some octants, as bits: [octants]. A direction has eight faces around the voxel.
   std::array<std::uint8_t, 256> by_octants{};
   std::array<IVec3, 8> offsets{};  // of the faces' voxels
+  std::array<int, 8> words{};      // the same in words of a layer, without x
 };
 
 const std::array<DarkenedFaces, 6>& darkened_faces() {
@@ -288,6 +323,7 @@ const std::array<DarkenedFaces, 6>& darkened_faces() {
         offset = -normal_of(direction);
         offset[frame.u] += i % 3 - 1;
         offset[frame.v] += i / 3 - 1;
+        faces.words[number] = word_index(offset.z, offset.y) - word_index(0, 0);
         for (unsigned octants = 0; octants < 256; ++octants) {
           for (unsigned octant = 0; octant < 8; ++octant) {
             if ((octants >> octant & 1U) == 0) continue;
@@ -339,20 +375,22 @@ bool take_face(Direction direction, const IVec3& voxel, Scratch& s) {
 // Replaces the keys of single faces, sorted, by their quads.
 void make_quads(const Job& job, QuadBuffer& faces) {
   const ShapedVoxels& shapes = *job.shapes;
+  const Chunk& centre = *job.chunks->centre();
+  const std::array<CornerOccluders, 6>& occluders = cube_occluders();
   std::size_t count = 0;
   std::uint64_t last_key = 0;
   for (const Quad face : faces) {  // read before it is overwritten: there are no more quads than faces
     const auto [direction, voxel] = FaceOrder::face(face.bits);
     const FaceFrame& frame = frame_of(direction);
-    const unsigned packed = occlusion_of(cube_occluders()[static_cast<std::size_t>(direction)],
-                                         &shapes.octants[ShapedVoxels::octants_at(voxel)]);
+    const unsigned packed =
+        occlusion_of(occluders[static_cast<std::size_t>(direction)], &shapes.cells[ShapedVoxels::cell_at(voxel)]);
     const FaceOcclusion corners = unpacked_occlusion(packed);
     Quad quad;
     quad.bits = static_cast<std::uint64_t>(voxel.x) | static_cast<std::uint64_t>(voxel.y) << 6 |
                 static_cast<std::uint64_t>(voxel.z) << 12 | std::uint64_t{packed} << Quad::kOcclusionShift |
                 std::uint64_t{flips_diagonal(corners)} << Quad::kFlipShift |
                 static_cast<std::uint64_t>(direction) << Quad::kDirectionShift |
-                std::uint64_t{job.chunks->get(voxel)} << Quad::kTypeShift;
+                std::uint64_t{centre.get(voxel.x, voxel.y, voxel.z)} << Quad::kTypeShift;
     const bool is_u = FaceOrder::kBitAxis[frame.axis] == frame.u;  // columns are along u
     const bool is_constant = is_u ? corners[0] == corners[1] && corners[3] == corners[2]
                                   : corners[0] == corners[3] && corners[1] == corners[2];
@@ -373,7 +411,7 @@ void make_quads(const Job& job, QuadBuffer& faces) {
 
 const ShapedVoxel* ShapedVoxels::at(const IVec3& local) const {
   const auto word = static_cast<std::size_t>(word_index(local.z, local.y));
-  const std::uint64_t row = cells.words[word];
+  const std::uint64_t row = rows.words[word];
   const std::uint64_t before = ends.words[word] >> 63;
   std::size_t number = first[row_of(local.y, local.z)];
   if (local.x < 0) return before != 0 ? &voxels[number] : nullptr;
@@ -387,26 +425,29 @@ const ShapedVoxel* ShapedVoxels::at(const IVec3& local) const {
   return &voxels[number];
 }
 
-void list_shapes(const Job& job, bool has_ends) {
+void list_shapes(const Job& job) {
   ShapedVoxels& shapes = *job.shapes;
   shapes.voxels.clear();
   shapes.quads.clear();
-  shapes.has_octants = false;
+  shapes.has_cells = false;
   const IBox around{job.region.min - 1, job.region.max + 1};
   const int first = std::max(around.min.x, 0);
   const int last = std::min(around.max.x, kChunkEdge) - 1;
   const std::uint64_t cells = (~std::uint64_t{0} << first) & (~std::uint64_t{0} >> (kChunkEdge - 1 - last));
-  const std::uint64_t ends =
-      has_ends ? std::uint64_t{around.min.x < 0} << 63 | std::uint64_t{around.max.x > kChunkEdge} : 0;
+  const std::uint64_t ends = std::uint64_t{around.min.x < 0} << 63 | std::uint64_t{around.max.x > kChunkEdge};
   const auto add = [&](const IVec3& local) {
-    const VoxelType type = job.chunks->get(local);
-    const bool darkens = (*job.types)[type].visibility == Visibility::Opaque;
-    shapes.voxels.push_back({local, type, darkens, shape_at(*job.chunks, *job.types, local)});
+    ShapedVoxel voxel{.local = local, .type = job.chunks->get(local)};
+    voxel.is_opaque = (*job.types)[voxel.type].visibility == Visibility::Opaque;
+    voxel.model = shape_at(*job.chunks, *job.types, local);
+    for (std::size_t side = 0; side < 6 && voxel.is_opaque; ++side) {
+      voxel.covered |= static_cast<std::uint8_t>(unsigned{voxel.model->covers_side[side]} << side);
+    }
+    shapes.voxels.push_back(voxel);
   };
   for (int z = around.min.z; z < around.max.z; ++z) {
     for (int y = around.min.y; y < around.max.y; ++y) {
       const auto at = static_cast<std::size_t>(word_index(z, y));
-      const std::uint64_t row = shapes.cells.words[at] &= cells;
+      const std::uint64_t row = shapes.rows.words[at] &= cells;
       const std::uint64_t beyond = shapes.ends.words[at] &= ends;
       shapes.first[ShapedVoxels::row_of(y, z)] = static_cast<std::uint32_t>(shapes.voxels.size());
       if ((beyond >> 63) != 0) add({-1, y, z});
@@ -422,30 +463,33 @@ namespace {
 bool is_covered(const Job& job, const ShapedVoxel& voxel, const ModelFace& face) {
   const IVec3 at = voxel.local + normal_of(face.direction);
   const ShapedVoxels& shapes = *job.shapes;
-  if (const ShapedVoxel* other = shapes.at(at)) {
-    return covers(*job.types, other->type, other->model, voxel.type, face.direction, face.mask);
+  const auto opposite_side = static_cast<unsigned>(face.direction) ^ 1U;
+  const unsigned cell = shapes.cells[ShapedVoxels::cell_at(at)];
+  if ((cell >> (ShapedVoxels::kCoveredShift + opposite_side) & 1U) != 0) return true;
+  if ((cell & ShapedVoxels::kShaped) != 0) {
+    const ShapedVoxel& other = *shapes.at(at);
+    return covers(*job.types, other.type, other.model, voxel.type, face.direction, face.mask);
   }
-  // All opaque cubes fill their octants, if all of them occlude.
-  if (shapes.has_octants && !job.has_unoccluding) return shapes.octants[ShapedVoxels::octants_at(at)] != 0;
-  return covers(*job.types, job.chunks->get(at), nullptr, voxel.type, face.direction, face.mask);
+  // The cells of opaque cubes that do not occlude look like air.
+  return job.has_unoccluding && covers(*job.types, job.chunks->get(at), nullptr, voxel.type, face.direction, face.mask);
 }
 
 }  // namespace
 
 void append_shape_faces(const Job& job, ShapeFaceBuffer& out) {
   const ShapedVoxels& shapes = *job.shapes;
+  if (!shapes.has_cells) return;  // all of the region is opaque
   for (const ShapedVoxel& voxel : shapes.voxels) {
     if (!job.region.contains(voxel.local)) continue;
-    const std::uint8_t* const octants =
-        shapes.has_octants ? &shapes.octants[ShapedVoxels::octants_at(voxel.local)] : nullptr;
+    const ShapedVoxels::Cell* const cell = &shapes.cells[ShapedVoxels::cell_at(voxel.local)];
     const auto place = static_cast<std::uint32_t>(voxel.local.x | voxel.local.y << 6 | voxel.local.z << 12);
     std::uint16_t number = 0;
     for (const ModelFace& face : voxel.model->faces) {
       const std::uint16_t own = number++;
       if (face.on_side && is_covered(job, voxel, face)) continue;
       ShapeFace made{voxel.model, place, own, voxel.type};
-      if (octants != nullptr && face.occluders[0][0] != kNoOccluder) {
-        made.bits |= occlusion_of(face.occluders, octants) << ShapeFace::kOcclusionShift;
+      if (job.occlusion && face.occluders[0][0] != kNoOccluder) {
+        made.bits |= occlusion_of(face.occluders, cell) << ShapeFace::kOcclusionShift;
       }
       out.push_back(made);
     }
@@ -539,9 +583,8 @@ void TurnedTypes::apply(const Chunk& chunk, const VoxelRegistry& types, QuadBuff
 
 void hide_faces_behind_shapes(const Job& job, Scratch& s) {
   for (const ShapedVoxel& voxel : job.shapes->voxels) {
-    if (!voxel.darkens) continue;
-    for (const Direction side : kDirections) {
-      if (!voxel.model->covers_side[static_cast<std::size_t>(side)]) continue;
+    for (unsigned left = voxel.covered; left != 0; left &= left - 1) {
+      const auto side = static_cast<Direction>(std::countr_zero(left));
       const IVec3 behind = voxel.local + normal_of(side);
       if (job.region.contains(behind)) take_face(opposite(side), behind, s);
     }
@@ -550,17 +593,30 @@ void hide_faces_behind_shapes(const Job& job, Scratch& s) {
 
 void take_faces_next_to_shapes(const Job& job, bool row_ends, Scratch& s) {
   ShapedVoxels& shapes = *job.shapes;
-  if (!job.occlusion || shapes.voxels.empty()) return;
-  fill_octants(job, row_ends, s);
+  if (shapes.voxels.empty()) return;
+  fill_cells(job, row_ends, s);
+  if (!job.occlusion) return;
+  std::array<std::uint64_t*, 6> layers{};
+  for (const Direction direction : kDirections) {
+    layers[static_cast<std::size_t>(direction)] = faces_towards(direction, s).words;
+  }
+  const std::array<DarkenedFaces, 6>& darkened = darkened_faces();
+  const IBox inner{job.region.min + 1, job.region.max - 1};
   for (const ShapedVoxel& voxel : shapes.voxels) {
-    if (!voxel.darkens || voxel.model->filled_octants == 0) continue;
-    for (const Direction direction : kDirections) {
-      const DarkenedFaces& faces = darkened_faces()[static_cast<std::size_t>(direction)];
+    if (!voxel.is_opaque || voxel.model->filled_octants == 0) continue;
+    const bool is_inner = inner.contains(voxel.local);
+    const int word = word_index(voxel.local.z, voxel.local.y);
+    for (std::size_t d = 0; d < 6; ++d) {
+      const DarkenedFaces& faces = darkened[d];
       for (unsigned left = faces.by_octants[voxel.model->filled_octants]; left != 0; left &= left - 1) {
-        const IVec3 at = voxel.local + faces.offsets[static_cast<std::size_t>(std::countr_zero(left))];
-        if (job.region.contains(at) && take_face(direction, at, s)) {
-          shapes.quads.push_back({FaceOrder::key(direction, at)});
-        }
+        const auto i = static_cast<std::size_t>(std::countr_zero(left));
+        const IVec3 at = voxel.local + faces.offsets[i];
+        if (!is_inner && !job.region.contains(at)) continue;
+        std::uint64_t& row = layers[d][word + faces.words[i]];
+        const std::uint64_t bit = std::uint64_t{1} << at.x;
+        if ((row & bit) == 0) continue;
+        row &= ~bit;
+        shapes.quads.push_back({FaceOrder::key(static_cast<Direction>(d), at)});
       }
     }
   }
@@ -611,6 +667,7 @@ struct BlockyMesher::Scratch : blocky::Scratch, LargeObject {
     }
     if (shapes == nullptr) shapes = std::make_unique<Shapes>();
     shapes->is_in_centre = is_in_centre;
+    shapes->has_transparent_cubes = blocky::holds_transparent_cubes(*chunks.centre(), types);
     return shapes.get();
   }
 
@@ -673,7 +730,7 @@ void BlockyMesher::mesh(const Neighbourhood& chunks, const VoxelRegistry& types,
   }
   out.resize(scratch.quads);
   if (shapes != nullptr) blocky::insert_by_direction(shapes->quads, out);
-  if (types.has_turned_by_state() && !out.empty()) scratch.turned.apply(*centre, types, out);
+  if (!out.empty() && blocky::holds_turned_cubes(*centre, types)) scratch.turned.apply(*centre, types, out);
 }
 
 Quad quad_part(Quad quad, int u, int v, int size_u, int size_v) {

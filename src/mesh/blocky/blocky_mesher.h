@@ -99,31 +99,37 @@ struct OcclusionTables {
 struct ShapedVoxel {
   IVec3 local{0};  // -1 to 64
   VoxelType type = kAir;
-  bool darkens = false;  // its material is opaque
+  bool is_opaque = false;    // its material: it hides and darkens faces
+  std::uint8_t covered = 0;  // if opaque: the sides that it covers wholly, by direction
   const ShapeModel* model = nullptr;
 };
 
 // The shaped voxels of a region and of the voxels around it.
 struct ShapedVoxels {
   static constexpr int kEdge = kChunkEdge + 2;
-  static constexpr int kOctantStride = kChunkEdge + 16;
+  static constexpr int kCellStride = kChunkEdge + 16;
   static constexpr std::size_t kRows = std::size_t{kEdge} * kEdge;
 
-  bool has_any = false;             // some chunk of the neighbourhood has some
-  bool is_in_centre = false;        // the centre has some
-  Layer cells;                      // in the z view's layout
-  Layer ends;                       // as View::ends
-  std::uint32_t first[kRows];       // by row_of: the number of voxels before the row
-  BlockVector<ShapedVoxel> voxels;  // by z, y, x
-  // Eighths of each voxel that darken corners (ShapeModel::filled_octants), by octants_at, if the corners' occlusion is
-  // wanted. Valid within two voxels of shaped ones.
-  BlockVector<std::uint8_t> octants;
-  bool has_octants = false;
+  // An entry of `cells`: the eighths of the voxel that darken corners (ShapeModel::filled_octants), the sides that it
+  // covers wholly, by direction, and a bit for voxels with shapes.
+  using Cell = std::uint16_t;
+  static constexpr unsigned kCoveredShift = 8;
+  static constexpr Cell kShaped = 1U << 14;
+  static constexpr Cell kCube = 0x3FFF;  // an occluder
+
+  bool is_in_centre = false;           // the centre has some
+  bool has_transparent_cubes = false;  // the centre has some
+  Layer rows;                          // shaped voxels, in the z view's layout
+  Layer ends;                          // as View::ends
+  std::uint32_t first[kRows];          // by row_of: the number of voxels before the row
+  BlockVector<ShapedVoxel> voxels;     // by z, y, x
+  BlockVector<Cell> cells;             // by cell_at; valid within two voxels of shaped ones
+  bool has_cells = false;
   QuadBuffer quads;  // of cubes next to shapes, which the kernel leaves out
 
   static std::size_t row_of(int y, int z) { return static_cast<std::size_t>((z + 1) * kEdge + y + 1); }
-  static std::size_t octants_at(const IVec3& local) {
-    return row_of(local.y, local.z) * kOctantStride + static_cast<std::size_t>(local.x + 8);
+  static std::size_t cell_at(const IVec3& local) {
+    return row_of(local.y, local.z) * kCellStride + static_cast<std::size_t>(local.x + 8);
   }
   // Returns the shaped voxel at a position within the region or next to it, or null.
   [[nodiscard]] const ShapedVoxel* at(const IVec3& local) const;
@@ -233,8 +239,8 @@ class TurnedTypes {
   QuadBuffer made_;
 };
 
-// Lists the shaped voxels in and around the region from `shapes->cells`. `has_ends`: `shapes->ends` is valid.
-void list_shapes(const Job& job, bool has_ends);
+// Lists the shaped voxels in and around the region from `shapes->rows` and `shapes->ends`.
+void list_shapes(const Job& job);
 
 // Removes, from the layers of faces, the faces of cubes that shapes cover.
 void hide_faces_behind_shapes(const Job& job, Scratch& scratch);

@@ -174,6 +174,37 @@ void count_faces(benchmark::State& state) {
 }
 BENCHMARK(count_faces)->Name("count_faces/world")->Unit(benchmark::kMicrosecond);
 
+// Meshes a town; a time is per chunk. `is_shaped` false: the same blocks as cubes.
+void mesh_town(benchmark::State& state, bool is_shaped) {
+  const Grid grid = workloads::town();
+  const VoxelRegistry types = workloads::town_types(is_shaped);
+  std::vector<Neighbourhood> chunks;
+  for (const IVec3 chunk : grid.chunks()) chunks.push_back(grid.neighbourhood(chunk));
+  BlockyMesher mesher;
+  QuadBuffer quads;
+  ShapeFaceBuffer shapes;
+  std::int64_t quad_count = 0;
+  std::int64_t face_count = 0;
+  for (const Neighbourhood& chunk : chunks) {
+    mesher.mesh(chunk, types, {}, quads, shapes);
+    quad_count += static_cast<std::int64_t>(quads.size());
+    face_count += static_cast<std::int64_t>(shapes.size());
+  }
+  if ((face_count > 0) != is_shaped) state.SkipWithError("faces of shapes where none should be, or none");
+  std::size_t next = 0;
+  for (auto _ : state) {
+    mesher.mesh(chunks[next], types, {}, quads, shapes);
+    benchmark::DoNotOptimize(quads.data());
+    benchmark::DoNotOptimize(shapes.data());
+    next = next + 1 == chunks.size() ? 0 : next + 1;
+  }
+  state.counters["chunks"] = static_cast<double>(chunks.size());
+  state.counters["quads"] = static_cast<double>(quad_count);
+  state.counters["shape_faces"] = static_cast<double>(face_count);
+}
+BENCHMARK_CAPTURE(mesh_town, shapes, true)->Name("shapes/town/mesh")->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(mesh_town, cubes, false)->Name("shapes/town/mesh_cubes")->Unit(benchmark::kMicrosecond);
+
 const bool kRegistered = [] {
   register_set("", instruction_set());
   for (const auto& [prefix, set] : kLesserSets) register_set(prefix, set);
