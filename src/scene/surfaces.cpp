@@ -136,12 +136,15 @@ FaceTexels face_texels(const VoxelFace& face, Direction direction, float emissio
   found.texels = texture.level(0).data();
   found.log_size = static_cast<std::uint8_t>(texture.level_count() - 1);
   found.alpha = face.alpha;
+  found.last = static_cast<std::uint32_t>(texture.size() - 1);
   const TextureFrame frame = texture_frame(face, direction);
   for (std::size_t i = 0; i < 2; ++i) {
     const IVec3& along = i == 0 ? frame.right : frame.down;
     const int axis = along.x != 0 ? 0 : along.y != 0 ? 1 : 2;
     found.axis[i] = static_cast<std::uint8_t>(axis);
-    found.sign[i] = along[axis] < 0 ? -1.0F : 1.0F;
+    const auto size = static_cast<double>(texture.size());
+    found.scale[i] = along[axis] < 0 ? -size : size;
+    found.offset[i] = along[axis] < 0 ? size : 0.0;
   }
   found.linear = linear_bytes().data();
   found.tint = linear_colour(face.tint);
@@ -168,7 +171,7 @@ Vec3 triplanar_colour(const TypeFaces& faces, const FieldPoint& point) {
     const float weight = weights[static_cast<std::size_t>(axis)];
     if (!(weight > 0.0F)) continue;
     const FaceTexels& side = faces.sides[static_cast<std::size_t>(2 * axis + (n[axis] < 0.0F ? 1 : 0))];
-    colour += weight * side.colour(side.texel(inside, mipmap_level(square, side.log_size)));
+    colour += weight * side.colour(side.texel(inside, IVec3(0), mipmap_level(square, side.log_size)));
   }
   return colour;
 }
@@ -240,10 +243,12 @@ bool Surfaces::update(const VoxelRegistry& types) {
     put(static_cast<VoxelType>(type), types[static_cast<VoxelType>(type)]);
   }
   for (const TypeChange& change : changes->items_unless_all()) put(change.type, types[change.type]);
-  has_ = {};
-  for (const auto& each : faces_) {
-    if (each != nullptr) has_[static_cast<std::size_t>(each->content)] = true;
-  }
+  const auto has = [&](CellContent content) {
+    return std::ranges::any_of(faces_, [&](const auto& each) { return each != nullptr && each->content == content; });
+  };
+  has_textures_ = types.has_textures();
+  has_textured_glass_ = has(CellContent::TexturedGlass);
+  has_cells_of_faces_ = has(CellContent::Faces);
   changes.commit();
   return true;
 }
@@ -252,7 +257,7 @@ namespace {
 
 // Appends the texel of a side at `met.t`, if it is visible. Returns false if it ends the ray.
 bool meet_side(const FaceTexels& side, const Ray& ray, IVec3 cell, MetFace& met, std::vector<MetFace>& out) {
-  const Rgba8 texel = side.texel(ray.origin + ray.direction * met.t - DVec3(cell), 0);
+  const Rgba8 texel = side.texel(ray.origin + ray.direction * met.t, cell, 0);
   met.cover = side.cover(texel);
   if (met.cover == 0.0F) return true;
   met.colour = side.colour(texel);

@@ -7,7 +7,10 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
+
+#include <glm/gtc/type_ptr.hpp>
 
 #include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
@@ -61,31 +64,47 @@ enum class CellContent : std::uint8_t {
   Faces,
 };
 
+/// The number of texels of the levels with at most 2^i texels per side, by i.
+inline constexpr std::array<std::uint32_t, 11> kTexelsUpTo = [] {
+  static_assert(kMaxTextureSize == 1 << 10);
+  std::array<std::uint32_t, 11> sums{1};
+  for (std::size_t i = 1; i < sums.size(); ++i) sums[i] = sums[i - 1] + (1U << 2U * i);
+  return sums;
+}();
+
 /// A textured face, ready for lookups of texels.
 struct FaceTexels {
   const Rgba8* texels = nullptr;  ///< of all mipmap levels, level 0 first
+  const float* linear = nullptr;  ///< linear light by sRGB byte
   std::uint8_t log_size = 0;      ///< of level 0; also the number of the last level
   FaceAlpha alpha = FaceAlpha::Opaque;
   std::array<std::uint8_t, 2> axis{};  ///< of the grid, along the texture's rows and down its columns
-  std::array<float, 2> sign{};         ///< of that axis
-  const float* linear = nullptr;       ///< linear light by sRGB byte
-  Vec3 tint{1.0F};
+  std::array<double, 2> scale{};       ///< texels of level 0 per voxel along the axis, negative against it
+  std::array<double, 2> offset{};      ///< texels from the texture's edge to the voxel's lower side
+  std::uint32_t last = 0;              ///< the last row and column of level 0
   float emission = 0.0F;
+  Vec3 tint{1.0F};
 
-  /// Returns the texel that `texel_at` returns. `inside`: the position in its voxel. `level`: 0 to `log_size`.
-  [[nodiscard]] Rgba8 texel(const DVec3& inside, int level) const {
-    const auto log_width = static_cast<unsigned>(log_size - level);
-    const auto along = [&](std::size_t i) { return texel_number(inside[axis[i]], sign[i], 1U << log_width); };
-    // The levels before have size^2 * (1 + 1/4 + ...) texels.
-    const std::uint32_t begin = ((4U << 2U * log_size) - (4U << 2U * log_width)) / 3U;
-    return texels[begin + (along(1) << log_width) + along(0)];
+  /// Returns the texel that `texel_at` returns for a position on the face, in the grid. `level`: 0 to `log_size`.
+  [[nodiscard]] Rgba8 texel(const DVec3& position, const IVec3& voxel, int level) const {
+    // Coarser levels have the same texels, by powers of two. NaN gives the first one.
+    const auto along = [&](std::size_t i) {
+      const double share = glm::value_ptr(position)[axis[i]] - glm::value_ptr(voxel)[axis[i]];
+      const double at = share * scale[i] + offset[i];
+      return std::min(static_cast<std::uint32_t>(std::max(0.0, at)), last) >> level;
+    };
+    return texels[begin(level) + (along(1) << (log_size - level)) + along(0)];
+  }
+  /// Returns the index of a level's first texel.
+  [[nodiscard]] std::uint32_t begin(int level) const {
+    return kTexelsUpTo[log_size] - kTexelsUpTo[static_cast<std::size_t>(log_size - level)];
   }
   /// Returns the texel's tinted colour in linear light.
   [[nodiscard]] Vec3 colour(Rgba8 texel) const {
     return Vec3(linear[texel.r], linear[texel.g], linear[texel.b]) * tint;
   }
   /// Returns the tinted mean of the texture, weighted by alpha: its last mipmap level.
-  [[nodiscard]] Vec3 mean() const { return colour(texel(DVec3(0.5), log_size)); }
+  [[nodiscard]] Vec3 mean() const { return colour(texels[begin(log_size)]); }
   /// Returns the share of the light behind it that a texel hides, 0 to 1.
   [[nodiscard]] float cover(Rgba8 texel) const {
     if (alpha == FaceAlpha::Translucent) return static_cast<float>(texel.a) / 255.0F;
@@ -146,16 +165,20 @@ class Surfaces {
   [[nodiscard]] const TypeFaces* faces(VoxelType type) const {
     return type < faces_.size() ? faces_[type].get() : nullptr;
   }
-  /// Returns true if any type has this content. Cost: O(1).
-  [[nodiscard]] bool has(CellContent content) const { return has_[static_cast<std::size_t>(content)]; }
+  /// Returns `faces` of all types; empty without textures.
+  [[nodiscard]] std::span<const std::shared_ptr<const TypeFaces>> all_faces() const { return faces_; }
+  /// Returns true if any type has textures.
+  [[nodiscard]] bool has_textures() const { return has_textures_; }
+  /// Returns true if any type has textured glass or cells of faces.
+  [[nodiscard]] bool has_textured_cells() const { return has_textured_glass_ || has_cells_of_faces_; }
+  /// Returns true if any type has cells of faces.
+  [[nodiscard]] bool has_cells_of_faces() const { return has_cells_of_faces_; }
   /// Returns true if a type hides the faces of its neighbours. Unregistered ids do.
   [[nodiscard]] bool is_opaque(VoxelType type) const {
     return type + std::size_t{1} >= surfaces_.size() || is_opaque_[type] != 0;
   }
   /// Returns the surface of a field's material. kAir has no material and is white, as in smooth meshes.
   [[nodiscard]] const Surface& of_field(VoxelType material) const;
-  /// Returns true if any type has textures. Cost: O(1).
-  [[nodiscard]] bool has_textures() const { return !faces_.empty(); }
   /// Returns the colour, emission, roughness and metalness at a point of a field's surface: the weighted mean of the
   /// solid samples among the 27 around it. With `point`, textured materials show their textures there. A flat smooth
   /// mesh has the same colours: at the middle of a cell the samples of its corners have equal weights, and between cell
@@ -176,7 +199,9 @@ class Surfaces {
   ChangeCursor followed_;
   std::vector<std::shared_ptr<const TypeFaces>> faces_;  // empty without textures
   std::vector<std::uint8_t> is_opaque_;
-  std::array<bool, 3> has_{};  // by CellContent, of types with faces
+  bool has_textures_ = false;
+  bool has_textured_glass_ = false;
+  bool has_cells_of_faces_ = false;
 };
 
 /// The way of a ray through a cell, or through a block of cells of one type.

@@ -37,6 +37,7 @@ inline constexpr std::uint8_t kMaxLightCost = 15;
 ///   Transparent  shown           false            false
 ///
 /// Rays see an opaque type as a solid surface and a transparent one as glass (or as a medium, if it scatters light).
+/// Textured transparent types can also be hollow cells of faces (FaceAlpha), such as leaves.
 /// A transparent type also hides the faces between two of its own voxels.
 enum class Visibility : std::uint8_t { Air, Opaque, Transparent };
 

@@ -31,8 +31,8 @@ struct RenderOptions {
 struct RenderedImage {
   Image colour;
   /// Distance in world units from the camera to the first voxel (also transparent) or field surface, along the ray
-  /// through each pixel's centre. 0 inside a voxel or field; +infinity where the ray hits nothing. Empty unless
-  /// RenderOptions::depth is set.
+  /// through each pixel's centre. Clear texels of cutout faces count as air. 0 inside a voxel or field; +infinity where
+  /// the ray hits nothing. Empty unless RenderOptions::depth is set.
   FloatImage depth;
   std::int64_t rays = 0;        ///< number of rays traced, of all kinds
   std::int64_t pixels_hit = 0;  ///< pixels whose centre shows a voxel or a field
@@ -48,6 +48,11 @@ struct RenderedImage {
 ///              transmits (1 - a) (1 - a (1 - c)). A body of voxels counts as at least one voxel long. It shows its own
 ///              lit colour in proportion to its coverage, tints sunlight and does not occlude. Seen from inside, it
 ///              only tints and emits.
+/// Textures:    VoxelProperties::faces. A transparent type whose faces are all translucent is such a body, with the
+///              colour and alpha of the texel where the ray enters it. Any other textured transparent type is a hollow
+///              cell: rays of all kinds meet those of its faces that meshes show, and go on through invisible texels.
+///              Visible texels of cutout and opaque faces are seen from both sides, cast shadows and occlude.
+///              Translucent texels are seen from outside, and tint as one voxel of glass.
 /// Solid:       if the camera is inside an opaque voxel, the whole image has the voxel's unlit colour.
 ///
 /// Holds the acceleration structures of the scene's grids: build it once and render any number of images.

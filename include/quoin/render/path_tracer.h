@@ -63,6 +63,8 @@ struct PathImage {
 /// Glass:       glass that the camera sees, directly or by reflection, refracts by the types' `ior` and absorbs by path
 ///              length. Light between surfaces passes glass straight and tinted: no caustics. The part that alpha
 ///              covers is matte.
+/// Textures:    as in CpuRenderer, always with the texels of mipmap level 0. Types with VoxelProperties::scattering
+///              have their mean colour.
 /// Fog, clouds: light scatters any number of times in Environment::fog and in transparent types with
 ///              VoxelProperties::scattering.
 /// Lamps:       emissive faces and Scene::lamps are sampled with a light tree. Emissive fields and glass are hit only

@@ -77,6 +77,7 @@ struct SceneHit {
 ///            elements of types whose `visibility` is Transparent. Halved grids have cubes in place of shapes.
 /// Precision: the ray is transformed into each grid in double, so at 10^9 from the origin a hit is as exact as the ray.
 /// Filters:   excluded voxels and instances count as air; a ray that starts inside them starts in air.
+/// Textures:  a ray hits a voxel also where its texels are invisible.
 /// Partial:   with UnloadedChunks::Block, a hit is certain or reports the entry into unloaded space, and a miss
 ///            means that the ray stays in loaded chunks. Costs a look-up per chunk on the ray.
 /// Cost:      O(log instances + grids on the ray). For grids with excluded types, also O(such voxels, and field cells,

@@ -80,8 +80,8 @@ class Tile {
     bool is_closed = false;  // nothing behind is visible
   };
   // Adds the transparent content visible before `max_t`, without the reflections of its surfaces.
-  Sight add_transparent(const Ray& ray, double max_t, std::size_t pixel);
-  void add_body(const Ray& ray, const GlassBody& body, const DVec3& normal, std::size_t pixel, Sight& sight);
+  // Not inlined: the loop over pixels stays small.
+  __attribute__((noinline)) Sight add_transparent(const Ray& ray, double max_t, std::size_t pixel);
   void add_face(const Ray& ray, const MetFace& face, std::size_t pixel, Sight& sight);
   // Processes a ray's entry into a body from air (null) or from a touching body. `normal`: of that surface, in its
   // grid.
@@ -172,12 +172,15 @@ void Tile::take_block(int x, int y, const RayPacket& rays, int sample) {
     const auto pixel = static_cast<std::size_t>((y + lane / kBlock) * kEdge + x + lane % kBlock);
     const bool is_hit = (hits.grids.hit >> lane & 1U) != 0;
     const double t = is_hit ? hits.grids.t[i] : std::numeric_limits<double>::infinity();
-    seen_.clear();
+    double begin = t;
     Sight sight;
-    if ((through_glass >> lane & 1U) != 0) sight = add_transparent(rays.ray(lane), t, pixel);
+    if ((through_glass >> lane & 1U) != 0) {
+      sight = add_transparent(rays.ray(lane), t, pixel);
+      begin = std::min(t, seen_.begin());
+    }
     if (sample == 0) {
-      depth_[pixel] = static_cast<float>(std::min(t, seen_.begin()));
-      pixels_hit_ += is_hit || !seen_.empty();
+      depth_[pixel] = static_cast<float>(begin);
+      pixels_hit_ += begin < std::numeric_limits<double>::infinity();
     }
     sample_[pixel] = sight.mirrored;
     if (sight.is_closed) continue;
@@ -243,14 +246,17 @@ void Tile::put_on_shape(const ShapeModel& model, std::int16_t face, const Vec3& 
 }
 
 Tile::Sight Tile::add_transparent(const Ray& ray, double max_t, std::size_t pixel) {
-  find_transparent(*context_->view, context_->lighting->surfaces(), ray, max_t, seen_);
+  const Surfaces& surfaces = context_->lighting->surfaces();
+  find_transparent(*context_->view, surfaces, ray, max_t, seen_);
   Sight sight;
   const LightOptions& light = context_->options->light;
+  const bool as_solid = shows_values(light.shading);
   const bool has_surfaces = light.glass_surfaces && light.shading == Shading::Lit;
   const GlassBody* last = nullptr;
   auto face = seen_.faces.begin();
+  const auto faces_end = seen_.faces.end();
   const auto add_faces = [&](double up_to) {
-    for (; face != seen_.faces.end() && face->t <= up_to; ++face) add_face(ray, *face, pixel, sight);
+    for (; face != faces_end && face->t <= up_to; ++face) add_face(ray, *face, pixel, sight);
   };
   for (const GlassBody& body : seen_.bodies) {
     const DVec3 normal = normal_entered(*context_->view, ray, body);
@@ -264,23 +270,18 @@ Tile::Sight Tile::add_transparent(const Ray& ray, double max_t, std::size_t pixe
       enter_body(ray, touches ? last : nullptr, body, normal, sight);
     }
     last = &body;
-    add_body(ray, body, normal, pixel, sight);
+    if (as_solid && body.starts_inside) continue;
+    std::optional<Surface> textured;
+    const GlassLook look = as_solid ? GlassLook{Vec3(0.0F), 1.0F} : look_of(surface_of(surfaces, body, textured), body);
+    fill_in(ray, body, normal, add_point(pixel, sight.passed * look.own));
+    sight.passed *= look.passed;
   }
-  if (last != nullptr) add_faces(last->t_exit);
-  if (has_surfaces && last != nullptr && !lies_on_opaque(*context_->view, ray, *last, seen_.end)) {
-    leave_body(ray, *last, sight);
+  if (has_surfaces && last != nullptr) {
+    add_faces(last->t_exit);
+    if (!lies_on_opaque(*context_->view, ray, *last, seen_.end)) leave_body(ray, *last, sight);
   }
   add_faces(std::numeric_limits<double>::infinity());
   return sight;
-}
-
-void Tile::add_body(const Ray& ray, const GlassBody& body, const DVec3& normal, std::size_t pixel, Sight& sight) {
-  const bool as_solid = shows_values(context_->options->light.shading);
-  if (as_solid && body.starts_inside) return;
-  const GlassLook look =
-      as_solid ? GlassLook{Vec3(0.0F), 1.0F} : look_of(surface_of(context_->lighting->surfaces(), body), body);
-  fill_in(ray, body, normal, add_point(pixel, sight.passed * look.own));
-  sight.passed *= look.passed;
 }
 
 void Tile::add_face(const Ray& ray, const MetFace& face, std::size_t pixel, Sight& sight) {
@@ -288,7 +289,7 @@ void Tile::add_face(const Ray& ray, const MetFace& face, std::size_t pixel, Sigh
   SurfacePoint& point = add_point(pixel, is_solid ? sight.passed : sight.passed * face.cover);
   point.voxel = face.voxel;
   point.face = face.face;
-  point.side = face.side;
+  point.shown_side = static_cast<std::uint16_t>(face.side + 1);
   point.placed = face.placed;
   point.type = face.type;
   point.position = on_face(context_->view->grid_from_view(face.placed).point(ray.origin + ray.direction * face.t),

@@ -47,7 +47,7 @@ Texture plain(Rgba8 colour) {
   for (int i = 0; i < 256; ++i) image.rgba.insert(image.rgba.end(), {colour.r, colour.g, colour.b, colour.a});
   return Texture::from_image("plain", image).value();
 }
-// Texels of `colour`, each second of which is invisible, as on a chess board with squares of `size` texels.
+// A chess board with squares of `size` texels, which are of this colour or invisible.
 Texture chess(Rgba8 colour, int size) {
   AlphaImage image{16, 16, {}};
   for (int y = 0; y < 16; ++y) {
@@ -94,8 +94,8 @@ class AllFaces {
     }
   }
 
-  // Returns the unlit light of a ray that starts outside, before a background. `nearest`: the distance of what it
-  // shows first, at least 1e-4 of it.
+  // Returns the unlit light of a ray that starts outside, before a background. `nearest`: the distance of the first
+  // visible content.
   [[nodiscard]] Vec3 seen(const Ray& ray, Vec3 background, double& nearest) const {
     std::vector<Met> met;
     for (const Face& face : faces_) add_met(face, ray, met);
@@ -351,7 +351,7 @@ TEST(RenderCutout, BlendsPanesInARow) {
     const Rgba8 tint{200, 120, 40, 96};
     std::array<VoxelFace, 6> faces;
     for (VoxelFace& face : faces) face = {.texture = plain(tint), .alpha = FaceAlpha::Translucent};
-    // One cutout face makes the type a cell of faces, of which the others look the same.
+    // One cutout face makes the type a cell of faces; its other faces look the same.
     if (is_hollow) faces[0] = {.texture = chess(tint, 4), .alpha = FaceAlpha::Cutout};
     const VoxelType pane = add_transparent(scene, VoxelFaces(faces));
     const VoxelType wall = add_type(scene, {40, 90, 220, 255});

@@ -28,6 +28,11 @@ bool continues(const GlassBody& body, VoxelType type, double t_enter) {
   return type == body.type && reaches(body, t_enter);
 }
 
+// Returns the alpha of a translucent texel, 0 to 1.
+float alpha_of(Rgba8 texel) {
+  return static_cast<float>(texel.a) / 255.0F;
+}
+
 // The bodies of one placed grid along a ray, in order.
 class BodiesOfGrid {
  public:
@@ -41,8 +46,6 @@ class BodiesOfGrid {
         max_t_(max_t),
         length_(length),
         voxels_per_cell_(placed_.voxels_per_cell()),
-        has_faces_(placed_.level == 0 && surfaces.has(CellContent::Faces)),
-        has_textured_glass_(placed_.level == 0 && surfaces.has(CellContent::TexturedGlass)),
         out_(out.bodies),
         faces_(out.faces) {
     QUOIN_ASSERT(placed_.voxel_size > 0.0, "a positive voxel size");
@@ -50,37 +53,10 @@ class BodiesOfGrid {
 
   // Returns false if a face ends the ray.
   bool add_voxels() {
-    begin();
-    GridReader voxels_of(*placed_.voxels);
-    VoxelType type = kAir;
-    bool is_cell_of_faces = false;
-    bool is_open = true;
-    const auto largest = [&] { return is_cell_of_faces ? kLargestBlock : largest_block(log_clarity_); };
-    const auto enter = [&](const trace::WalkSpan& begun) {
-      type = voxels_of.get(begun.voxel);
-      is_cell_of_faces = has_faces_ && has_content(type, CellContent::Faces);
-      log_clarity_ = has_textured_glass_ ? log_clarity_at(type, begun) : surfaces_[type].log_clarity;
-    };
-    trace::visit_blocks(*placed_.transparent, ray_, max_t_, enter, largest, [&](const trace::WalkSpan& span) {
-      if (is_cell_of_faces) {
-        is_open = meet_cell(surfaces_, voxels_of, index_, type, ray_, cell_span(span), max_t_, faces_);
-        return is_open;
-      }
-      const double t_exit = std::min(span.t_exit, max_t_);
-      const double voxels = voxels_between(span.t_enter, t_exit);
-      if (!(voxels > 0.0)) return true;  // an edge that it only touches
-      if (out_.size() > first_ && continues(out_.back(), type, span.t_enter)) {
-        // Most water voxels are inside the water.
-        lengthen(t_exit, span.exit_face, voxels);
-      } else {
-        GlassBody& next = out_.emplace_back(body_of(span.voxel, type, span.t_enter, t_exit, span.starts_inside));
-        next.face = span.face;
-        next.exit_face = span.exit_face;
-        if (has_textured_glass_) take_texel(next);
-      }
-      return is_seen_beyond(log_clarity_, voxels);
-    });
-    return is_open;
+    // Two loops, so that worlds without textures pay nothing.
+    if (placed_.level == 0 && surfaces_.has_textured_cells()) return add_textured_voxels();
+    add_plain_voxels();
+    return true;
   }
 
   void add_shapes() {
@@ -105,7 +81,10 @@ class BodiesOfGrid {
     begin();
     const auto largest = [this](VoxelType type) { return largest_block(surfaces_[type].log_clarity); };
     visit_glass(*placed_.glass, ray_, max_t_, largest, [&](const GlassSpan& span) {
-      GlassBody next = body_of(span.cell, span.type, span.t_enter, span.t_exit, span.starts_inside);
+      GlassBody next;
+      fill_in(next, span.cell, span.type, span.t_enter, span.t_exit);
+      next.starts_inside = span.starts_inside;
+      next.voxels = voxels_between(span.t_enter, span.t_exit);
       next.in_field = next.exit_in_field = true;
       if (out_.size() > first_ && reaches(out_.back(), next.t_enter)) next.before = out_.back().type;
       return add(next);
@@ -113,6 +92,92 @@ class BodiesOfGrid {
   }
 
  private:
+  // Flat, as the only loop of its kind would be: with two loops GCC no longer inlines the walk (3 % of an image).
+  __attribute__((flatten)) void add_plain_voxels() {
+    begin();
+    GridReader voxels_of(*placed_.voxels);
+    VoxelType type = kAir;
+    const auto largest = [&] { return largest_block(surfaces_[type].log_clarity); };
+    const auto enter = [&](const trace::WalkSpan& begun) { type = voxels_of.get(begun.voxel); };
+    trace::visit_blocks(*placed_.transparent, ray_, max_t_, enter, largest, [&](const trace::WalkSpan& span) {
+      return add_span(span, type, surfaces_[type].log_clarity, nullptr);
+    });
+  }
+
+  __attribute__((noinline)) bool add_textured_voxels() {
+    begin();
+    GridReader voxels_of(*placed_.voxels);
+    VoxelType type = kAir;
+    CellContent content = CellContent::Glass;
+    float log_clarity = 0.0F;
+    Rgba8 texel;
+    bool is_open = true;
+    const auto largest = [&] { return content == CellContent::Faces ? kLargestBlock : largest_block(log_clarity); };
+    const auto enter = [&](const trace::WalkSpan& begun) {
+      type = voxels_of.get(begun.voxel);
+      const TypeFaces* const faces = surfaces_.faces(type);
+      content = faces == nullptr ? CellContent::Glass : faces->content;
+      log_clarity = surfaces_[type].log_clarity;
+      if (content != CellContent::TexturedGlass) return;
+      const FaceTexels* const side = side_entered(*faces, type, begun, texel);
+      if (side != nullptr) {
+        log_clarity = std::log(1.0F - side->cover(texel));
+      } else {
+        content = CellContent::Glass;  // its mean colour
+      }
+    };
+    trace::visit_blocks(*placed_.transparent, ray_, max_t_, enter, largest, [&](const trace::WalkSpan& span) {
+      if (content == CellContent::Faces) {
+        is_open = meet_cell(surfaces_, voxels_of, index_, type, ray_, cell_span(span), max_t_, faces_);
+        return is_open;
+      }
+      return add_span(span, type, log_clarity, content == CellContent::TexturedGlass ? &texel : nullptr);
+    });
+    return is_open;
+  }
+
+  // Finds the texel of textured glass that continues or begins with a span. Returns its side; null if the ray began
+  // inside.
+  [[nodiscard]] const FaceTexels* side_entered(const TypeFaces& faces, VoxelType type, const trace::WalkSpan& begun,
+                                               Rgba8& texel) const {
+    if (out_.size() > first_ && continues(out_.back(), type, begun.t_enter)) {
+      const GlassBody& body = out_.back();
+      texel = body.texel;
+      return body.is_textured ? &faces.sides[static_cast<std::size_t>(body.face)] : nullptr;
+    }
+    if (begun.starts_inside) return nullptr;
+    const FaceTexels& side = faces.sides[static_cast<std::size_t>(begun.face)];
+    texel = side.texel(ray_.origin + ray_.direction * begun.t_enter, begun.voxel, 0);
+    return &side;
+  }
+  static CellSpan cell_span(const trace::WalkSpan& span) {
+    return {span.voxel, span.behind, span.face, span.exit_face, span.starts_inside, span.t_enter, span.t_exit};
+  }
+
+  // Adds a span to the last body, or as a new one with a texel, if there is one. Returns false if nothing behind it is
+  // visible.
+  bool add_span(const trace::WalkSpan& span, VoxelType type, float log_clarity, const Rgba8* texel) {
+    const double t_exit = std::min(span.t_exit, max_t_);
+    const double voxels = voxels_between(span.t_enter, t_exit);
+    if (!(voxels > 0.0)) return true;  // an edge that it only touches
+    if (out_.size() > first_ && continues(out_.back(), type, span.t_enter)) {
+      // Most water voxels are inside the water.
+      lengthen(t_exit, span.exit_face, voxels);
+    } else {
+      GlassBody& next = out_.emplace_back();  // filled in place
+      fill_in(next, span.voxel, type, span.t_enter, t_exit);
+      next.starts_inside = span.starts_inside;
+      next.voxels = voxels;
+      next.face = span.face;
+      next.exit_face = span.exit_face;
+      if (texel != nullptr) {
+        next.is_textured = true;
+        next.texel = *texel;
+      }
+    }
+    return is_seen_beyond(log_clarity, voxels);
+  }
+
   void begin() {
     first_ = out_.size();
     clarity_ = 0.0;
@@ -125,17 +190,12 @@ class BodiesOfGrid {
     return (clarity_ - kClosed) / std::max(closing, kLeastClosing);
   }
 
-  [[nodiscard]] GlassBody body_of(IVec3 voxel, VoxelType type, double t_enter, double t_exit,
-                                  bool starts_inside) const {
-    GlassBody body;
+  void fill_in(GlassBody& body, IVec3 voxel, VoxelType type, double t_enter, double t_exit) const {
     body.placed = body.exit_placed = index_;
     body.voxel = voxel;
     body.type = type;
-    body.starts_inside = starts_inside;
     body.t_enter = t_enter;
     body.t_exit = t_exit;
-    body.voxels = voxels_between(t_enter, t_exit);
-    return body;
   }
   [[nodiscard]] double voxels_between(double t_enter, double t_exit) const {
     return (t_exit - t_enter) * length_ / placed_.voxel_size * voxels_per_cell_;
@@ -152,40 +212,6 @@ class BodiesOfGrid {
     return clarity_ > kClosed;
   }
 
-  [[nodiscard]] bool has_content(VoxelType type, CellContent content) const {
-    const TypeFaces* const faces = surfaces_.faces(type);
-    return faces != nullptr && faces->content == content;
-  }
-  // Returns the texel where the ray enters a body of textured glass; null for any other body.
-  [[nodiscard]] const FaceTexels* texels_at(VoxelType type, Direction face, bool starts_inside) const {
-    if (starts_inside || !has_content(type, CellContent::TexturedGlass)) return nullptr;
-    return &surfaces_.faces(type)->sides[static_cast<std::size_t>(face)];
-  }
-  [[nodiscard]] Rgba8 texel_at(const FaceTexels& side, IVec3 voxel, double t) const {
-    return side.texel(ray_.origin + ray_.direction * t - DVec3(voxel), 0);
-  }
-  // Returns the clarity of the body that continues or begins with a span.
-  [[nodiscard]] float log_clarity_at(VoxelType type, const trace::WalkSpan& begun) const {
-    if (out_.size() > first_ && continues(out_.back(), type, begun.t_enter)) {
-      return out_.back().is_textured ? log_of_clear(out_.back().alpha) : surfaces_[type].log_clarity;
-    }
-    const FaceTexels* const side = texels_at(type, begun.face, begun.starts_inside);
-    if (side == nullptr) return surfaces_[type].log_clarity;
-    return log_of_clear(side->cover(texel_at(*side, begun.voxel, begun.t_enter)));
-  }
-  [[nodiscard]] static float log_of_clear(float cover) { return std::log(1.0F - cover); }
-  void take_texel(GlassBody& body) const {
-    const FaceTexels* const side = texels_at(body.type, body.face, body.starts_inside);
-    if (side == nullptr) return;
-    const Rgba8 texel = texel_at(*side, body.voxel, body.t_enter);
-    body.is_textured = true;
-    body.colour = side->colour(texel);
-    body.alpha = side->cover(texel);
-  }
-  static CellSpan cell_span(const trace::WalkSpan& span) {
-    return {span.voxel, span.behind, span.face, span.exit_face, span.starts_inside, span.t_enter, span.t_exit};
-  }
-
   // Notes the part of a shape's glass within a cell.
   void note_part(const ShapeSpan& span, const VoxelSpan& cell) {
     const ShapeModel& model = *span.shape->model;
@@ -199,8 +225,10 @@ class BodiesOfGrid {
     const VoxelFace* const look = face == nullptr ? nullptr : look_of(model, *face, (*types_)[span.shape->type].faces);
     const bool has_texture = look != nullptr && !look->texture.is_null();
     if (has_texture && look->alpha != FaceAlpha::Translucent) return;  // no glass
-    GlassBody& part = parts_.emplace_back(body_of(span.shape->voxel, span.shape->type, t_enter, t_exit, starts_inside));
-    if (is_plate) part.voxels = kThinnest;
+    GlassBody& part = parts_.emplace_back();
+    fill_in(part, span.shape->voxel, span.shape->type, t_enter, t_exit);
+    part.starts_inside = starts_inside;
+    part.voxels = is_plate ? kThinnest : voxels_between(t_enter, t_exit);
     part.model = &model;
     part.shape_face = starts_inside ? std::int16_t{-1} : span.enter.face;
     part.exit_in_shape = true;
@@ -210,10 +238,9 @@ class BodiesOfGrid {
     part.exit_face = nearest_direction(DVec3(part.exit_normal));
     if (!has_texture) return;
     const DVec3 point = ray_.origin + ray_.direction * span.enter.t - DVec3(span.shape->voxel);
-    const Rgba8 texel = shape_texel(*face, *look, point);
     part.is_textured = true;
-    part.colour = linear_colour(texel) * linear_colour(look->tint);
-    part.alpha = static_cast<float>(texel.a) / 255.0F;
+    part.texel = shape_texel(*face, *look, point);
+    part.look = look;
   }
 
   // Returns false if nothing behind the body is visible.
@@ -228,7 +255,9 @@ class BodiesOfGrid {
     } else {
       out_.push_back(next);
     }
-    const float log_clarity = next.is_textured ? log_of_clear(next.alpha) : surfaces_[next.type].log_clarity;
+    // Only shapes are textured here.
+    const float log_clarity =
+        next.is_textured ? std::log(1.0F - alpha_of(next.texel)) : surfaces_[next.type].log_clarity;
     return is_seen_beyond(log_clarity, next.voxels);
   }
 
@@ -240,14 +269,11 @@ class BodiesOfGrid {
   double max_t_;
   double length_;  // of the ray's direction, in the world
   double voxels_per_cell_;
-  bool has_faces_;
-  bool has_textured_glass_;
   std::vector<GlassBody>& out_;
   std::vector<MetFace>& faces_;
   std::vector<GlassBody> parts_;  // of shapes, in the cell that the ray is in
   std::size_t first_ = 0;
   double clarity_ = 0.0;
-  float log_clarity_ = 0.0F;  // of the body that the ray is in
 };
 
 // Sorts bodies along the ray and joins those of neighbouring grids that touch.
@@ -297,25 +323,36 @@ void find_transparent(const SceneView& view, const Surfaces& surfaces, const Ray
   out.clear();
   out.end = max_t;
   const double length = glm::length(ray_in_view.direction);
+  int lists = 0;  // of bodies, each in order and joined
   view.visit_transparent(ray_in_view, max_t, [&](std::int32_t index, const Ray& ray) {
     QUOIN_ASSERT(static_cast<std::size_t>(index) < placed_in(view.tracer()).size(), "one of the placed grids");
     const PlacedGrid& placed = placed_in(view.tracer())[static_cast<std::size_t>(index)];
     BodiesOfGrid bodies(view, surfaces, index, ray, out.end, length, out);
+    const bool has_shapes = placed.shapes != nullptr && placed.shapes->has_glass();
+    lists += (placed.transparent != nullptr ? 1 : 0) + (has_shapes ? 1 : 0) + (placed.glass != nullptr ? 1 : 0);
     if (placed.transparent != nullptr && !bodies.add_voxels()) out.end = out.faces.back().t;
-    if (placed.shapes != nullptr && placed.shapes->has_glass()) bodies.add_shapes();
+    if (has_shapes) bodies.add_shapes();
     if (placed.glass != nullptr) bodies.add_field();
   });
-  join_touching(out.bodies);
+  if (lists > 1) join_touching(out.bodies);
   if (!out.faces.empty()) end_at_first_closed(out);
 }
 
-Surface surface_of(const Surfaces& surfaces, const GlassBody& body) {
-  Surface surface = surfaces[body.type];
-  if (!body.is_textured) return surface;
-  surface.colour = body.colour;
+Surface textured_surface(const Surfaces& surfaces, const GlassBody& body) {
   const TypeFaces* const faces = surfaces.faces(body.type);
-  surface.emitted = body.colour * (faces == nullptr ? 0.0F : faces->sides.front().emission);
-  set_absorption(body.alpha, surface);
+  QUOIN_ASSERT(body.is_textured, "textured glass");
+  Surface surface = surfaces[body.type];
+  if (body.look != nullptr) {
+    surface.colour = linear_colour(body.texel) * linear_colour(body.look->tint);
+    surface.emitted = surface.colour * (faces == nullptr ? 0.0F : faces->sides.front().emission);
+    set_absorption(alpha_of(body.texel), surface);
+    return surface;
+  }
+  QUOIN_ASSERT(faces != nullptr, "textured glass");
+  const FaceTexels& side = faces->sides[static_cast<std::size_t>(body.face)];
+  surface.colour = side.colour(body.texel);
+  surface.emitted = surface.colour * side.emission;
+  set_absorption(side.cover(body.texel), surface);
   return surface;
 }
 
@@ -377,7 +414,8 @@ Vec3 transmittance_along(const SceneView& view, const Surfaces& surfaces, const 
   Vec3 passed(1.0F);
   find_transparent(view, surfaces, ray_in_view, max_t, room);
   if (room.is_closed()) return Vec3(0.0F);
-  for (const GlassBody& body : room.bodies) passed *= look_of(surface_of(surfaces, body), body).passed;
+  std::optional<Surface> textured;
+  for (const GlassBody& body : room.bodies) passed *= look_of(surface_of(surfaces, body, textured), body).passed;
   for (const MetFace& face : room.faces) passed *= face.passed();
   return passed;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include <quoin/core/vec.h>
@@ -28,15 +29,15 @@ struct GlassBody {
   bool in_field = false;                  ///< the ray enters through a field's surface; `face` is unused
   bool exit_in_field = false;             ///< the ray leaves through a field's surface; `exit_face` is unused
   VoxelType before = kAir;                ///< fields only: the transparent material that ends where this one begins
-  /// True for CellContent::TexturedGlass and textured shapes that the ray enters: colour and alpha are those of a
-  /// texel of level 0.
+  /// True for CellContent::TexturedGlass and textured shapes that the ray enters.
   bool is_textured = false;
-  Vec3 colour{0.0F};
-  float alpha = 0.0F;
-  /// For shapes: the side through which the ray enters, an index into `model->faces`, or -1 if it starts inside; the
-  /// model of `voxel`, else null; and the outward normals where it enters and leaves, in the grid.
+  Rgba8 texel{};  ///< of level 0, where the ray enters textured glass
+  /// For shapes: the side through which the ray enters, an index into `model->faces`, or -1 if it starts inside; its
+  /// look, if it is textured; the model of `voxel`, else null; and the outward normals where it enters and leaves, in
+  /// the grid.
   std::int16_t shape_face = -1;
   bool exit_in_shape = false;
+  const VoxelFace* look = nullptr;
   const ShapeModel* model = nullptr;
   Vec3 normal{0.0F};
   Vec3 exit_normal{0.0F};
@@ -68,8 +69,13 @@ struct SeenThrough {
 void find_transparent(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view, double max_t,
                       SeenThrough& out);
 
-/// Returns the surface of a body: that of its type, with the colour and alpha of its texel.
-[[nodiscard]] Surface surface_of(const Surfaces& surfaces, const GlassBody& body);
+/// Returns the surface of textured glass: that of its type, with the colour and alpha of its texel.
+[[nodiscard]] Surface textured_surface(const Surfaces& surfaces, const GlassBody& body);
+/// Returns the surface of a body. `room`: memory for that of textured glass, which must outlive the result.
+[[nodiscard]] inline const Surface& surface_of(const Surfaces& surfaces, const GlassBody& body,
+                                               std::optional<Surface>& room) {
+  return body.is_textured ? room.emplace(textured_surface(surfaces, body)) : surfaces[body.type];
+}
 
 /// The appearance of a body to a ray that passes through it.
 struct GlassLook {

@@ -501,7 +501,7 @@ std::int64_t Lighting::trace_openness(const Group& group, std::uint32_t lanes, s
   }
   const int count = directions_.count();
   const float factor = field_openness_factor(options_);
-  const bool has_faces = surfaces_->has(CellContent::Faces) && view_->tracer().has_transparent();
+  const bool has_faces = surfaces_->has_cells_of_faces() && view_->tracer().has_transparent();
   for (int ray = 0; ray < count && rays.active != 0; ++ray) {
     set_occlusion_directions(group, ray, rays);
     std::uint32_t blocked = view_->any_hits(group.placed, rays);
@@ -568,30 +568,32 @@ void Lighting::show_textures(double spacing, bool is_perspective) {
   QUOIN_ASSERT(spacing > 0.0, "a positive distance of samples");
   is_perspective_ = is_perspective;
   has_other_surfaces_ = true;
+  if (detail_surfaces_.empty()) faces_ = surfaces_->all_faces();
   const BlockVector<PlacedGrid>& placed = placed_in(view_->tracer());
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     // Distances from the eye are in voxels, too.
     const double in_voxels = is_perspective ? spacing : spacing / placed[i].voxel_size;
     frames_[i].square_spacing = in_voxels * in_voxels;
+    frames_[i].shows_means = frames_[i].voxels_per_cell != 1.0;
     frames_[i].eye = view_->grid_from_view(static_cast<std::int32_t>(i)).offset;
   }
 }
 
 // Returns null for a point that shows the colour of its type.
-const FaceTexels* Lighting::texels_at(const SurfacePoint& point) const {
-  const TypeFaces* const faces = surfaces_->faces(point.type);
-  if (faces == nullptr || point.in_field || point.kind == PointKind::Glow) return nullptr;
-  if (point.side != SurfacePoint::kSideOfFace) return &faces->sides[point.side];
-  if (point.orientation == 0) return &faces->sides[index_of(point.face)];
+inline const FaceTexels* Lighting::texels_at(const SurfacePoint& point) const {
+  if (point.type >= faces_.size() || point.in_field || point.shape_face >= 0 || point.kind == PointKind::Glow) {
+    return nullptr;
+  }
+  const TypeFaces* const faces = faces_[point.type].get();
+  if (faces == nullptr) return nullptr;
+  if (point.shown_side != 0) return &faces->sides[point.shown_side - std::size_t{1}];
+  if (point.orientation == 0) [[likely]] {
+    return &faces->sides[index_of(point.face)];
+  }
   return &faces->sides[index_of(AxisOrientation::at(point.orientation).inverse().apply(point.face))];
 }
 
-// Cells of halved grids stand for many voxels, as faces of impostors do.
-bool Lighting::shows_mean_of_face(const SurfacePoint& point) const {
-  return point.is_far || frames_[static_cast<std::size_t>(point.placed)].voxels_per_cell != 1.0;
-}
-
-// Inlined: `texel_colour` stays one function.
+// Inlined, as it is part of each texel's colour.
 __attribute__((always_inline)) inline double Lighting::square_spacing_at(const SurfacePoint& point) const {
   const Frame& frame = frames_[static_cast<std::size_t>(point.placed)];
   if (!is_perspective_) return frame.square_spacing;
@@ -599,14 +601,16 @@ __attribute__((always_inline)) inline double Lighting::square_spacing_at(const S
   return frame.square_spacing * glm::dot(away, away);
 }
 
-// As `texel_at`, with the mipmap level of the point's distance.
-Vec3 Lighting::texel_colour(const FaceTexels& face, const SurfacePoint& point) const {
+// As `texel_at`, with the mipmap level of the point's distance. Inlined, as its only caller has all it needs at hand.
+__attribute__((always_inline)) inline Vec3 Lighting::texel_colour(const FaceTexels& face,
+                                                                  const SurfacePoint& point) const {
   const int level = mipmap_level(square_spacing_at(point), face.log_size);
-  DVec3 inside = point.position - DVec3(point.voxel);
-  if (point.orientation != 0) [[unlikely]] {
-    inside = AxisOrientation::at(point.orientation).inverse().apply(inside - 0.5) + 0.5;
+  if (point.orientation == 0) [[likely]] {
+    return face.colour(face.texel(point.position, point.voxel, level));
   }
-  return face.colour(face.texel(inside, level));
+  const DVec3 inside = point.position - DVec3(point.voxel);
+  const DVec3 turned = AxisOrientation::at(point.orientation).inverse().apply(inside - 0.5) + 0.5;
+  return face.colour(face.texel(turned, IVec3(0), level));
 }
 
 Lighting::Colours Lighting::colours_of_shape(const SurfacePoint& point) const {
@@ -628,8 +632,22 @@ Lighting::Colours Lighting::colours_of_shape(const SurfacePoint& point) const {
 
 // Not inlined: the loop over unlit points stays small.
 __attribute__((noinline)) Lighting::Colours Lighting::other_colours_at(const SurfacePoint& point) const {
+  QUOIN_ASSERT(static_cast<std::size_t>(point.placed) < frames_.size(), "one of the placed grids");
+  const FaceTexels* const face = texels_at(point);
+  if (face == nullptr) [[unlikely]] {
+    return untextured_colours_at(point);
+  }
+  // A return of its own: a choice of colours would cost near points 8 % more.
+  if (point.is_far || frames_[static_cast<std::size_t>(point.placed)].shows_means) [[unlikely]] {
+    const Vec3 mean = face->mean();
+    return {mean, mean * face->emission};
+  }
+  const Vec3 colour = texel_colour(*face, point);
+  return {colour, colour * face->emission};
+}
+
+__attribute__((noinline)) Lighting::Colours Lighting::untextured_colours_at(const SurfacePoint& point) const {
   const auto placed = static_cast<std::size_t>(point.placed);
-  QUOIN_ASSERT(placed < frames_.size(), "one of the placed grids");
   const bool is_bare = point.in_field && point.type == kAir;
   if (!detail_surfaces_.empty() && !is_bare) return {detail_surfaces_[placed].colour, detail_surfaces_[placed].emitted};
   if (point.shape_face >= 0) return colours_of_shape(point);
@@ -639,15 +657,7 @@ __attribute__((noinline)) Lighting::Colours Lighting::other_colours_at(const Sur
     const FieldPoint textured{point.position * scale, point.normal, square_spacing_at(point) * scale * scale};
     return colours_of_field(point, &textured);
   }
-  const FaceTexels* const face = texels_at(point);
-  if (face == nullptr) return colours_of_type(point);
-  // A return of its own: a choice of colours would cost near points 8 % more.
-  if (shows_mean_of_face(point)) [[unlikely]] {
-    const Vec3 mean = face->mean();
-    return {mean, mean * face->emission};
-  }
-  const Vec3 colour = texel_colour(*face, point);
-  return {colour, colour * face->emission};
+  return colours_of_type(point);
 }
 
 Vec3 Lighting::normal_colour(const SurfacePoint& point) const {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -29,8 +30,6 @@ enum class PointKind : std::uint8_t {
 
 /// A point of a voxel's face, or of a field's surface, to be lit.
 struct SurfacePoint {
-  static constexpr std::uint16_t kSideOfFace = 0xFFFF;
-
   DVec3 position{0.0};      ///< in its grid, on the face or surface
   IVec3 voxel{0};           ///< of a shape's point: the voxel that has the shape
   std::int32_t placed = 0;  ///< index into SceneTracer::placed
@@ -41,9 +40,8 @@ struct SurfacePoint {
   bool is_blended = false;       ///< fields: a blend of the materials around, as Surfaces::blend_of_field
   bool is_tilted = false;        ///< of a shape's turned element, or inclined fluid: `normal` counts, not `face`
   std::uint8_t orientation = 0;  ///< AxisOrientation::index of a cube that its state turns
-  /// Index into TypeFaces::sides of the texture that it shows; kSideOfFace: that of `face`.
-  std::uint16_t side = kSideOfFace;
-  std::int16_t shape_face = -1;       ///< for a shape: the side that is seen, an index into `model->faces`, or -1
+  std::uint16_t shown_side = 0;  ///< 1 + the index in TypeFaces::sides of the texture that it shows; 0: that of `face`
+  std::int16_t shape_face = -1;  ///< for a shape: the side that is seen, an index into `model->faces`, or -1
   const ShapeModel* model = nullptr;  ///< of `voxel`, for a shape
   Vec3 normal{0.0F};                  ///< of a field or where `is_tilted`, in its grid, of unit length or 0
   float lift = 0.0F;                  ///< of a field: height of the position above the surface, along the normal
@@ -101,6 +99,7 @@ class Lighting {
     std::array<float, 6> diffuse{};
     DVec3 eye{0.0};               // of a perspective view
     double square_spacing = 0.0;  // of samples, in voxels; of a perspective view at a distance of 1 voxel
+    bool shows_means = false;     // of textures: cells of a halved grid stand for many voxels
   };
   struct Group;
   [[nodiscard]] static std::vector<std::uint32_t> coherent_order(std::span<const SurfacePoint> points);
@@ -135,12 +134,12 @@ class Lighting {
   [[nodiscard]] Colours colours_at(const SurfacePoint& point) const;
   // As `colours_at`, with textures or the colours of detail.
   [[nodiscard]] Colours other_colours_at(const SurfacePoint& point) const;
+  [[nodiscard]] Colours untextured_colours_at(const SurfacePoint& point) const;
   [[nodiscard]] Colours colours_of_type(const SurfacePoint& point) const;
   [[nodiscard]] Colours colours_of_field(const SurfacePoint& point, const FieldPoint* textured) const;
   // Returns the square of the distance between samples at a point, in voxels of its grid.
   [[nodiscard]] double square_spacing_at(const SurfacePoint& point) const;
   [[nodiscard]] const FaceTexels* texels_at(const SurfacePoint& point) const;
-  [[nodiscard]] bool shows_mean_of_face(const SurfacePoint& point) const;
   [[nodiscard]] Vec3 texel_colour(const FaceTexels& face, const SurfacePoint& point) const;
   [[nodiscard]] Colours colours_of_shape(const SurfacePoint& point) const;
   [[nodiscard]] Vec3 shade(const SurfacePoint& point, Vec3 direct, float openness) const;
@@ -161,6 +160,8 @@ class Lighting {
   std::vector<Surface> detail_surfaces_;  // of each placed grid; empty where types have their own colours
   bool has_other_surfaces_ = false;       // with `detail_surfaces_` or textures
   bool is_perspective_ = false;
+  // By type, of the surfaces; empty if textures are not shown.
+  std::span<const std::shared_ptr<const TypeFaces>> faces_;
   std::vector<GridLight> levels_;
   LightLook look_;
   float exposure_ = 1.0F;

@@ -129,7 +129,7 @@ Vec3 radiance_at(const PathLamp& lamp, Vec3 from_corner) {
   DVec3 inside(0.0);
   inside[frame.u] = in_voxel(lamp.u, lamp.size_u);
   inside[frame.v] = in_voxel(lamp.v, lamp.size_v);
-  return lamp.texels->colour(lamp.texels->texel(inside, 0)) * lamp.light_of_texel;
+  return lamp.texels->colour(lamp.texels->texel(inside, IVec3(0), 0)) * lamp.light_of_texel;
 }
 
 LampSample sample_rectangle(const PathLamp& lamp, DVec3 point, Pair u) {

@@ -194,7 +194,7 @@ TEST(PathTextures, ShowsEqualTranslucentTexelsAsGlass) {
   }
 }
 
-// A dark ceiling with one lamp, of which the texture lights one half, and a lamp of half the size.
+// A dark ceiling with one lamp, whose texture lights one half, and a lamp of half the size.
 TEST(PathTextures, SamplesLightOfTexels) {
   const auto image_of = [](bool has_texture) {
     Scene scene;

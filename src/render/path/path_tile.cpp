@@ -98,6 +98,7 @@ PathTile::PathTile(const TileContext& context, int column, int row)
       row_(row),
       kernel_(&kernel()),
       light_(light_of(*context.sky, *context.lamps)),
+      has_textures_or_lamps_(context.surfaces->has_textures() || light_.lamps != nullptr),
       pixels_(kPixels),
       sums_(kPixels) {
   QUOIN_ASSERT(column >= 0 && row >= 0, "a pixel of the image");
@@ -455,12 +456,6 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
     vertex.normal = (*context_->face_normals)[static_cast<std::size_t>(vertex.placed)][of_face];
     type = placed.voxels->get(voxel);
     surface = (*context_->surfaces)[type];
-    const TypeFaces* const faces = context_->surfaces->faces(type);
-    if (faces != nullptr && !starts_inside) {
-      const FaceTexels& side = faces->sides[of_face];
-      surface.colour = side.colour(side.texel(vertex.in_grid - DVec3(voxel), 0));
-      surface.emitted = surface.colour * side.emission;
-    }
   }
   if (path.is_first) sums_[path.pixel].scene_share += 1.0F;
   if (starts_inside) {  // from inside: its own colour, unlit
@@ -469,7 +464,11 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
     vertices_.pop_back();
     return;
   }
-  if (light_.lamps != nullptr) vertex.place = memory_.place_of(vertex.placed, voxel, face);
+  if (has_textures_or_lamps_) {
+    const bool has_texels = context_->surfaces->has_textures() && !in_field && !in_shape;
+    if (has_texels) show_texel(type, face, vertex.in_grid, voxel, surface);
+    if (light_.lamps != nullptr) vertex.place = memory_.place_of(vertex.placed, voxel, face);
+  }
   vertex.in_view = context_->view->view_from_grid(vertex.placed).point(vertex.in_grid);
   vertex.material = {surface.colour, surface.roughness, surface.metalness};
   if (!path.is_noted) {
@@ -483,6 +482,14 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
     const std::int32_t lamp = in_field || in_shape ? -1 : context_->lamps->lamp_of(vertex.placed, voxel, face);
     add_emitted(path, surface.emitted, lamp, static_cast<float>(hits.grids.t[i]));
   }
+}
+
+void PathTile::show_texel(VoxelType type, Direction face, const DVec3& position, IVec3 voxel, Surface& surface) const {
+  const TypeFaces* const faces = context_->surfaces->faces(type);
+  if (faces == nullptr) return;
+  const FaceTexels& side = faces->sides[static_cast<std::size_t>(face)];
+  surface.colour = side.colour(side.texel(position, voxel, 0));
+  surface.emitted = surface.colour * side.emission;
 }
 
 void PathTile::hit_ground(std::uint32_t index, double t) {
@@ -766,7 +773,8 @@ void PathTile::finish_requests(std::span<const std::uint32_t> requests, RayPacke
         continue;
       }
       for (const GlassBody& body : seen_.bodies) {
-        const Surface surface = surface_of(*context_->surfaces, body);
+        std::optional<Surface> textured;
+        const Surface& surface = surface_of(*context_->surfaces, body, textured);
         const double voxels = length_of(surface, body);
         request.light *= tint_of(surface, voxels) * (1.0F - cover_of(surface, voxels));
       }

@@ -172,6 +172,9 @@ class PathTile {
   // Processes one ray of a packet that neither glass nor fog stops.
   void meet_lane(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane, double until);
   void hit_matter(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane);
+  // Gives a surface the texel at a position on a voxel's face, in the grid, if its type has textures.
+  __attribute__((noinline)) void show_texel(VoxelType type, Direction face, const DVec3& position, IVec3 voxel,
+                                            Surface& surface) const;
   void hit_glass(std::uint32_t index, const GlassBody& body, const DVec3& normal_in_grid);
   void hit_face(std::uint32_t index, const MetFace& face);
   void hit_ground(std::uint32_t index, double t);
@@ -213,6 +216,7 @@ class PathTile {
   std::int64_t rays_ = 0;
   const Kernel* kernel_;
   ShadeLight light_;
+  bool has_textures_or_lamps_;  // one check per hit for both
   ShadeBlock block_;
   LampMemory memory_;
   std::vector<std::uint32_t> pixels_;  // hashes for Random

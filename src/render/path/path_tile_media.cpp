@@ -68,7 +68,8 @@ bool PathTile::pass_glass(std::uint32_t index) {
   std::size_t next_face = 0;
   for (const GlassBody& body : seen_.bodies) {
     if (pass_faces(index, body.t_enter, next_face, u)) return true;
-    const Surface surface = surface_of(*context_->surfaces, body);
+    std::optional<Surface> textured;
+    const Surface& surface = surface_of(*context_->surfaces, body, textured);
     const double voxels = length_of(surface, body);
     const float cover = cover_of(surface, voxels);
     if (u < cover) {
@@ -127,7 +128,8 @@ bool PathTile::enter_glass(std::uint32_t index) {
   QUOIN_ASSERT(!seen_.bodies.empty(), "a path that meets glass");
   Path& path = paths_[index];
   const GlassBody body = seen_.bodies.front();
-  const Surface surface = surface_of(*context_->surfaces, body);
+  std::optional<Surface> textured;
+  const Surface& surface = surface_of(*context_->surfaces, body, textured);
   const Ray ray{path.origin, DVec3(path.direction)};
   const float u = path.random.one(path.dimension + dimension::kGlass);
   if (body.starts_inside) {  // the camera is inside
@@ -229,7 +231,8 @@ void PathTile::hit_glass(std::uint32_t index, const GlassBody& body, const DVec3
   QUOIN_ASSERT(body.placed >= 0 && static_cast<std::size_t>(body.placed) < context_->placed.size(),
                "a body of one of the placed grids");
   Path& path = paths_[index];
-  const Surface surface = surface_of(*context_->surfaces, body);
+  std::optional<Surface> textured;
+  const Surface& surface = surface_of(*context_->surfaces, body, textured);
   Vertex vertex;
   vertex.path = index;
   vertex.placed = body.placed;
@@ -310,7 +313,7 @@ void PathTile::note_behind(Path& path, const SceneHits& hits, int lane, double t
   const auto i = static_cast<std::size_t>(lane);
   Vertex whole;
   whole.material.colour = Vec3(1.0F);
-  if (context_->surfaces->has(CellContent::Faces)) {
+  if (context_->surfaces->has_cells_of_faces()) {
     find_transparent(*context_->view, *context_->surfaces, {path.origin, DVec3(path.direction)}, t, seen_);
     if (seen_.is_closed()) {
       const MetFace& face = seen_.faces.back();

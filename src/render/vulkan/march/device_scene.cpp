@@ -41,7 +41,7 @@ bool can_be_traced(const Scene& scene, const Instance& instance, const SceneGrid
 const char* const kSendingTextures = "uploading textures";
 
 ShaderTexturedFace shader_face(const FaceTexels& face, std::uint64_t address) {
-  const auto axis = [&](std::size_t i) { return std::uint32_t{face.axis[i]} | (face.sign[i] < 0.0F ? 4U : 0U); };
+  const auto axis = [&](std::size_t i) { return std::uint32_t{face.axis[i]} | (face.scale[i] < 0.0 ? 4U : 0U); };
   return {address, face.log_size | axis(0) << 4 | axis(1) << 8, 0, Vec4(face.tint, face.emission)};
 }
 
