@@ -135,11 +135,14 @@ class Lighting {
   // As `colours_at`, with textures or the colours of detail.
   [[nodiscard]] Colours other_colours_at(const SurfacePoint& point) const;
   [[nodiscard]] Colours untextured_colours_at(const SurfacePoint& point) const;
+  // Sets the unlit colours of points, with textures or the colours of detail.
+  void show_other_colours(std::span<const SurfacePoint> points, std::span<Vec3> colours) const;
   [[nodiscard]] Colours colours_of_type(const SurfacePoint& point) const;
   [[nodiscard]] Colours colours_of_field(const SurfacePoint& point, const FieldPoint* textured) const;
   // Returns the square of the distance between samples at a point, in voxels of its grid.
   [[nodiscard]] double square_spacing_at(const SurfacePoint& point) const;
   [[nodiscard]] const FaceTexels* texels_at(const SurfacePoint& point) const;
+  [[nodiscard]] Vec3 textured_colour(const FaceTexels& face, const SurfacePoint& point) const;
   [[nodiscard]] Vec3 texel_colour(const FaceTexels& face, const SurfacePoint& point) const;
   [[nodiscard]] Colours colours_of_shape(const SurfacePoint& point) const;
   [[nodiscard]] Vec3 shade(const SurfacePoint& point, Vec3 direct, float openness) const;
