@@ -87,6 +87,7 @@ struct FaceTexels {
 
   /// Returns the texel that `texel_at` returns for a position on the face, in the grid. `level`: 0 to `log_size`.
   [[nodiscard]] Rgba8 texel(const DVec3& position, const IVec3& voxel, int level) const {
+    QUOIN_ASSERT(level >= 0 && level <= log_size, "a level of the texture");
     // Coarser levels have the same texels, by powers of two. NaN gives the first one.
     const auto along = [&](std::size_t i) {
       const double share = glm::value_ptr(position)[axis[i]] - glm::value_ptr(voxel)[axis[i]];

@@ -12,6 +12,7 @@
 
 #include <quoin/scene/scene_query.h>
 
+#include "core/work/nightly_for_tests.h"
 #include "render/cpu/environment_for_tests.h"
 #include "render/cpu/render_test_support.h"
 #include "scene/surfaces.h"
@@ -233,7 +234,7 @@ Scene random_scene(unsigned seed) {
 
 TEST(RenderCutout, AgreesWithSearchOverAllFaces) {
   constexpr int kPixels = 256;
-  for (unsigned seed = 1; seed <= 6; ++seed) {
+  for (unsigned seed = 1; seed <= static_cast<unsigned>(cases(4, 40)); ++seed) {
     SCOPED_TRACE(seed);
     const Scene scene = random_scene(seed);
     const AllFaces all(scene);
@@ -270,6 +271,32 @@ TEST(RenderCutout, AgreesWithSearchOverAllFaces) {
     }
     EXPECT_LE(wrong, kPixels * kPixels / 2000);
     EXPECT_LE(wrong_depth, kPixels * kPixels / 2000);
+  }
+}
+
+// Two grids with a gap between them look as one: content of the nearer grid hides that of the other.
+TEST(RenderCutout, ShowsTwoGridsAsOne) {
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    Scene one = random_scene(seed);
+    Scene two;
+    two.types = one.types;
+    Grid& whole = one.edit(one.grids().handles()[0]).grid;
+    whole.fill_box({{-3, -3, 0}, {9, 9, 1}}, kAir);
+    std::array<Grid, 2> parts;
+    const IBox box = whole.bounds();
+    for (int z = box.min.z; z < box.max.z; ++z) {
+      for (int y = box.min.y; y < box.max.y; ++y) {
+        for (int x = box.min.x; x < box.max.x; ++x) parts[z > 0 ? 1 : 0].set({x, y, z}, whole.get({x, y, z}));
+      }
+    }
+    for (Grid& part : parts) place(two, std::move(part));
+    RenderOptions options = sized(120, 90);
+    options.light = natural_light();
+    for (const DVec3 eye : {DVec3(7, 5, 14), DVec3(-6, 9, -13)}) {
+      const RenderedImage a = taken(one, towards(eye, {1, 0, 0}), options);
+      const RenderedImage b = taken(two, towards(eye, {1, 0, 0}), options);
+      EXPECT_LE(count_different(a, b, 1), 20) << seed;
+    }
   }
 }
 

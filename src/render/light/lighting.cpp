@@ -667,6 +667,7 @@ __attribute__((noinline)) void Lighting::show_other_colours(std::span<const Surf
 
 __attribute__((noinline)) Lighting::Colours Lighting::untextured_colours_at(const SurfacePoint& point) const {
   const auto placed = static_cast<std::size_t>(point.placed);
+  QUOIN_ASSERT(placed < frames_.size(), "one of the placed grids");
   const bool is_bare = point.in_field && point.type == kAir;
   if (!detail_surfaces_.empty() && !is_bare) return {detail_surfaces_[placed].colour, detail_surfaces_[placed].emitted};
   if (point.shape_face >= 0) return colours_of_shape(point);

@@ -194,6 +194,35 @@ TEST(PathTextures, ShowsEqualTranslucentTexelsAsGlass) {
   }
 }
 
+// A block of visible cutout texels in a lake of another grid looks as one of opaque texels.
+TEST(PathTextures, ShowsTexelsWithinGlassOfAnotherGrid) {
+  const auto image_of = [](FaceAlpha alpha) {
+    Scene scene;
+    VoxelProperties water;
+    water.colour = {60, 120, 200, 30};
+    water.visibility = Visibility::Transparent;
+    water.ior = 1.33F;
+    const VoxelType lake = scene.types.add(water).value();
+    const VoxelType ground = add_type(scene, {180, 180, 170, 255});
+    const Visibility visibility = alpha == FaceAlpha::Cutout ? Visibility::Transparent : Visibility::Opaque;
+    const VoxelType type = scene.types.add(textured({.texture = noise(255), .alpha = alpha}, visibility)).value();
+    Grid grid;
+    grid.fill_box({{-8, -1, -8}, {8, 0, 8}}, ground);
+    grid.fill_box({{-8, 0, -8}, {8, 6, 8}}, lake);
+    place(scene, std::move(grid));
+    Grid block;
+    block.fill_box({{-2, 0, -2}, {2, 3, 2}}, type);
+    place(scene, std::move(block), {0.5, 1.5, 0.5});
+    PathOptions options;
+    options.width = 48;
+    options.height = 36;
+    options.samples = 32;
+    options.environment = physical_day();
+    return path_image(scene, towards({9, 14, 12}, {0, 3, 0}), options);
+  };
+  EXPECT_LT(difference(image_of(FaceAlpha::Opaque), image_of(FaceAlpha::Cutout)), 0.03);
+}
+
 // A dark ceiling with one lamp, whose texture lights one half, and a lamp of half the size.
 TEST(PathTextures, SamplesLightOfTexels) {
   const auto image_of = [](bool has_texture) {
