@@ -149,12 +149,10 @@ bool is_visible_at(const VoxelProperties& type, const ShapeModel& model, const M
 // long ways.
 class CellSteps {
  public:
-  CellSteps(const Ray& ray, IVec3 cell, double t) : ray_(ray), cell_(cell), t_(t) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const double d = ray.direction[axis];
-      inverse_[axis] = d != 0.0 ? 1.0 / d : 0.0;
-      find_next(axis);
-    }
+  // `inverse`: of the direction's components; unused where they are 0.
+  CellSteps(const Ray& ray, const DVec3& inverse, IVec3 cell, double t)
+      : ray_(ray), inverse_(inverse), cell_(cell), t_(t) {
+    for (int axis = 0; axis < 3; ++axis) find_next(axis);
   }
   [[nodiscard]] IVec3 cell() const { return cell_; }
   // Return the distance of the ray's entry into the cell and, after a step, the face of entry.
@@ -180,10 +178,10 @@ class CellSteps {
   }
 
   const Ray& ray_;
+  DVec3 inverse_;
   IVec3 cell_;
   double t_;
   int axis_ = 0;
-  DVec3 inverse_{0.0};
   DVec3 next_{0.0};
 };
 
@@ -196,9 +194,8 @@ class ShapeRay {
   ShapeRay(const TracedShapes& shapes, const VoxelRegistry& types, ShapeIndex::Reader& reader, const Ray& ray,
            double max_t, ShapeParts parts)
       : shapes_(shapes), types_(types), reader_(reader), ray_(ray), max_t_(max_t), parts_(parts) {
-    const DVec3 size = glm::abs(ray.direction);
-    room_ = kBetweenCells / std::max(std::max(size.x, size.y), size.z);
     inverse_ = 1.0 / ray.direction;
+    room_ = kBetweenCells * std::min(std::min(std::abs(inverse_.x), std::abs(inverse_.y)), std::abs(inverse_.z));
   }
 
   // Looks at the shapes of one cell. Returns true if there is a hit, which is then the nearest one.
@@ -231,7 +228,7 @@ class ShapeRay {
       const double at = ray_.origin[axis];
       if (!(at > bounds.min[axis] - kSteps && at < bounds.max[axis] + kSteps)) return meet_cells();
     }
-    CellSteps steps(ray_, voxel_of(ray_.origin), 0.0);
+    CellSteps steps(ray_, inverse_, voxel_of(ray_.origin), 0.0);
     for (int i = 0; i < kSteps; ++i, steps.step()) {
       if (steps.t() > max_t_) return false;
       const std::span<const PlacedShape> here = reader_.at(steps.cell());
@@ -239,6 +236,9 @@ class ShapeRay {
     }
     return meet_cells(steps.t());
   }
+
+  // Returns the inverse of the direction's components: infinite where they are 0.
+  [[nodiscard]] const DVec3& inverse() const { return inverse_; }
 
   [[nodiscard]] ShapeHit hit() const {
     const PlacedShape& shape = *best_.shape;
@@ -431,7 +431,7 @@ std::uint32_t first_solids(const TracedShapes& shapes, const Grid& voxels, const
     const Ray in_grid = rays_in_grid.ray(lane);
     const double max_t = rays_in_grid.max_t[i];
     ShapeRay ray(shapes, types, solids.shapes, in_grid, max_t, ShapeParts::Visible);
-    CellSteps steps(in_grid, cell, hits.t[i]);
+    CellSteps steps(in_grid, ray.inverse(), cell, hits.t[i]);
     std::optional<RayHit> next;
     if (ray.meet_shapes(here, hits.t[i], steps.t_exit()) ||
         meet_solid_behind(ray, solids, in_grid, max_t, steps, next)) {
