@@ -45,9 +45,9 @@ struct QueryFilter {
 /// A ray hit in a scene.
 struct SceneHit {
   InstanceHandle instance;
-  /// Voxel in the traced grid: the instance's grid, unless the tracer uses a halved one. For a shape, the voxel
-  /// that has it, although the hit may lie outside: a shape reaches up to a voxel beyond its own. For a field, the cell
-  /// as in DensityHit.
+  /// Voxel in the traced grid: the instance's grid, unless the tracer uses a halved one. For a shape, its
+  /// voxel, although the hit may lie outside: a shape reaches up to a voxel beyond its own. For a field, the cell as in
+  /// DensityHit.
   IVec3 voxel{0};
   VoxelType type = kAir;  ///< for a field, the material
   /// Face of the voxel, in its grid, as in RayHit; for a shape or a field, the direction nearest to its normal.

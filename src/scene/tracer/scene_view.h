@@ -66,8 +66,8 @@ class SceneView {
   /// voxel, and a voxel before a field.
   void first_hits(const RayPacket& rays_in_view, SceneHits& hits) const;
 
-  /// Returns the rays that hit an opaque voxel, visible part of a shape or field of any instance. They are in the space
-  /// of grid `home`, which is tested first.
+  /// Returns the rays that hit an opaque voxel, visible part of a shape or field of any instance. They are in the
+  /// space of grid `home`, which is tested first.
   [[nodiscard]] std::uint32_t any_hits(std::int32_t home, const RayPacket& rays_in_grid) const;
   /// Sets `blocked[i]` to the result of `any_hits` for packet i. Faster than one by one for endless rays.
   /// Requires: at least as many elements in `blocked` as packets.
