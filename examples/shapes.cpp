@@ -91,11 +91,13 @@ quoin::Result<quoin::VoxelProperties> flower() {
   }
   const auto texture = quoin::Texture::from_image("flower", image);
   if (!texture) return texture.error();
-  return quoin::VoxelProperties{.name = "flower",
-                                .visibility = quoin::Visibility::Transparent,
-                                .collides = false,
-                                .faces = quoin::VoxelFace{.texture = *texture, .alpha = quoin::FaceAlpha::Cutout},
-                                .shapes = VoxelShape::crossed_plates()};
+  quoin::VoxelProperties made;
+  made.name = "flower";
+  made.visibility = quoin::Visibility::Transparent;
+  made.collides = false;
+  made.faces = quoin::VoxelFace{.texture = *texture, .alpha = quoin::FaceAlpha::Cutout};
+  made.shapes = VoxelShape::crossed_plates();
+  return made;
 }
 
 // A thin board along -X. Bit 2 of the state opens the door: the board turns about its corner.

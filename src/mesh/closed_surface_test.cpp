@@ -180,7 +180,7 @@ void expect_sound_shapes(const Grid& grid, const VoxelRegistry& types, double er
   EXPECT_NEAR(found.volume, volume, error);
 }
 
-// Of several boxes that overlap, touch or lie apart.
+// Returns a shape of several boxes that overlap, touch or lie apart.
 VoxelShape random_shape(std::mt19937& random, std::size_t boxes) {
   std::vector<ShapeElement> elements(boxes);
   for (ShapeElement& element : elements) {
