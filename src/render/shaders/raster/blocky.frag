@@ -10,9 +10,6 @@ layout(constant_id = 5) const uint kGlassStep = 0;  // draw mode, for the neares
 #include "mesh_light.glsl"
 #include "blocky_face.glsl"
 
-layout(location = 5) flat in uvec4 texels;
-layout(location = 6) flat in vec4 viewer;
-
 layout(location = 0) out vec4 pixel;
 
 // Returns the texel at the fragment, without tint.

@@ -12,6 +12,8 @@ layout(location = 1) flat in ivec4 base;
 layout(location = 2) flat in vec4 edges;
 layout(location = 3) flat in uvec2 what;
 layout(location = 4) centroid in vec4 colour;
+layout(location = 5) flat in uvec4 texels;
+layout(location = 6) flat in vec4 viewer;
 #endif
 
 // Returns a point on the face, slightly inside its edges, lifted off it: interpolated positions can lie outside the

@@ -43,6 +43,8 @@ void enter_first(inout BodyList list) {
 void main() {
   const float kWithin = 1e-4;
   if (is_beyond(what.x)) discard;
-  // With traced light vertices output the colour 0; it is read so that no output is unused.
-  pixel = colour + seen_from(mesh_frame().instances[what.y].home.w, base.xyz, before_face(what.x, -kWithin));
+  // With traced light and without textures vertices output the colour 0 and no texels; these are read so that no output
+  // is unused.
+  vec4 nothing = colour + viewer + vec4(texels);
+  pixel = nothing + seen_from(mesh_frame().instances[what.y].home.w, base.xyz, before_face(what.x, -kWithin));
 }
