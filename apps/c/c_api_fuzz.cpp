@@ -179,7 +179,8 @@ class Program {
     auto first = made<quoin_face>();
     first.name[0] = static_cast<char>('a' + byte() % 2);
     first.rgba = perhaps(bit() ? room_.data() : kOpaque.data());
-    first.texels = kTexels.at(byte() % (bit() ? 2 : kTexels.size()));
+    const std::size_t sizes = bit() ? 2 : kTexels.size();
+    first.texels = kTexels.at(byte() % sizes);
     first.turn = byte() % 5;
     first.mirrored = bit() ? 1 : 0;
     first.alpha = byte() % 4;
