@@ -20,6 +20,7 @@
 
 #include "core/coordinates/chunk_order.h"
 #include "core/moved_from.h"
+#include "grid/shapes/shape_index.h"
 #include "trace/chunk_rows.h"
 
 namespace quoin {
@@ -36,10 +37,14 @@ bool is_solid(const VoxelRegistry& types, VoxelType type) {
   return type != kAir && (type >= types.size() || types[type].collides);
 }
 
-// Gets a chunk's solid voxels. Returns false, without setting the rows, if the chunk is null or no voxel is solid.
+bool is_solid_cube(const VoxelRegistry& types, VoxelType type) {
+  return is_solid(types, type) && !types.is_shaped(type);
+}
+
+// Gets a chunk's solid cubes. Returns false, without setting the rows, if the chunk is null or no voxel is solid.
 bool read_solid_rows(const Chunk* chunk, const VoxelRegistry& types, SolidRows& rows) {
   if (chunk == nullptr) return false;
-  const auto counts = [&](VoxelType type) { return is_solid(types, type); };
+  const auto counts = [&](VoxelType type) { return is_solid_cube(types, type); };
   const FunctionRef<bool(VoxelType)> asked(counts);
   const trace::ChunkRows read(*chunk, asked);
   if (read.none()) return false;
@@ -172,6 +177,28 @@ void append_solid_boxes(const Chunk& chunk, const VoxelRegistry& types, std::vec
   if (read_solid_rows(&chunk, types, rows)) cut_boxes(rows, out);
 }
 
+void append_shape_boxes(const Grid& grid, IVec3 chunk, const VoxelRegistry& types, std::vector<DBox>& out) {
+  const Chunk* const voxels = types.has_shapes() ? grid.find_chunk(chunk) : nullptr;
+  if (voxels == nullptr) return;
+  const auto counts = [&](VoxelType type) { return is_solid(types, type) && types.is_shaped(type); };
+  const FunctionRef<bool(VoxelType)> asked(counts);
+  const trace::ChunkRows read(*voxels, asked);
+  if (read.none()) return;
+  SolidRows rows{};
+  read.for_each_row(kWholeChunk, [&](int y, int z, std::uint64_t row) {
+    rows[static_cast<std::size_t>(z) * kEdge + static_cast<std::size_t>(y)] = row;
+  });
+  const Neighbourhood near = grid.neighbourhood(chunk);
+  for (std::size_t row = 0; row < rows.size(); ++row) {
+    for (std::uint64_t left = rows[row]; left != 0; left &= left - 1) {
+      const IVec3 local{std::countr_zero(left), static_cast<int>(row % kEdge), static_cast<int>(row / kEdge)};
+      visit_solid_boxes(*shape_at(near, types, local), false, [&](const DBox& box) {
+        out.push_back({box.min + DVec3(local), box.max + DVec3(local)});
+      });
+    }
+  }
+}
+
 void append_solid_faces(const Grid& grid, IVec3 chunk, const VoxelRegistry& types, QuadBuffer& out) {
   SolidRows rows;
   if (!read_solid_rows(grid.find_chunk(chunk), types, rows)) return;
@@ -207,9 +234,13 @@ namespace {
 struct ChunkShapes {
   std::vector<IBox> boxes;
   QuadBuffer faces;
+  std::vector<DBox> of_shapes;
 
-  [[nodiscard]] bool empty() const { return boxes.empty() && faces.empty(); }
-  bool operator==(const ChunkShapes&) const = default;
+  [[nodiscard]] bool empty() const { return boxes.empty() && faces.empty() && of_shapes.empty(); }
+  bool operator==(const ChunkShapes& other) const {
+    const auto is_same = [](const DBox& a, const DBox& b) { return a.min == b.min && a.max == b.max; };
+    return boxes == other.boxes && faces == other.faces && std::ranges::equal(of_shapes, other.of_shapes, is_same);
+  }
 };
 
 std::vector<bool> solid_types(const VoxelRegistry& types) {
@@ -222,7 +253,8 @@ std::vector<bool> solid_types(const VoxelRegistry& types) {
 
 struct SolidShapes::Impl {
   [[nodiscard]] bool follow_types(const VoxelRegistry& types);
-  [[nodiscard]] std::vector<IVec3> chunks_to_make(const Grid& grid, const GridChanges& changes) const;
+  [[nodiscard]] std::vector<IVec3> chunks_to_make(const Grid& grid, const GridChanges& changes,
+                                                  const DataChanges& data) const;
   void make(const Grid& grid, IVec3 chunk, const VoxelRegistry& types, ChunkShapes& made) const;
 
   SolidShapesOptions options;
@@ -232,14 +264,15 @@ struct SolidShapes::Impl {
   std::unordered_map<IVec3, ChunkShapes, CoordinateHash> shapes;
 };
 
-// Returns true if types became solid or ceased to be.
+// Returns true if types became solid or ceased to be, or if shapes changed.
 bool SolidShapes::Impl::follow_types(const VoxelRegistry& types) {
   PendingChanges changes(followed_types, types);
   if (changes->empty()) return false;
   std::vector<bool> now = solid_types(types);
   // Unregistered types are solid.
   const auto is_other = [&](std::size_t i) { return (i >= now.size() || now[i]) != (i >= solid.size() || solid[i]); };
-  bool is_any_other = false;
+  bool is_any_other = changes->all && types.has_shapes();
+  for (const TypeChange& change : changes->items_unless_all()) is_any_other |= change.shape_changed;
   for (std::size_t i = 1; i < std::max(now.size(), solid.size()); ++i) is_any_other |= is_other(i);
   solid = std::move(now);
   changes.commit();
@@ -247,8 +280,20 @@ bool SolidShapes::Impl::follow_types(const VoxelRegistry& types) {
 }
 
 // Returns the chunks whose shapes may have changed: all chunks that have or had shapes if everything changed.
-std::vector<IVec3> SolidShapes::Impl::chunks_to_make(const Grid& grid, const GridChanges& changes) const {
+std::vector<IVec3> SolidShapes::Impl::chunks_to_make(const Grid& grid, const GridChanges& changes,
+                                                     const DataChanges& data) const {
   std::vector<IVec3> chunks = chunks_to_mesh(grid, changes);
+  // Shapes follow the state of their neighbours.
+  for (const DataChange& change : data.items_unless_all()) {
+    const IVec3 low = change.chunk * kChunkEdge;
+    const IBox near{chunk_of(low + change.box.min - 1), chunk_of(low + change.box.max) + 1};
+    for (int z = near.min.z; z < near.max.z; ++z) {
+      for (int y = near.min.y; y < near.max.y; ++y) {
+        for (int x = near.min.x; x < near.max.x; ++x) chunks.emplace_back(x, y, z);
+      }
+    }
+  }
+  if (!data.empty()) sort_and_unite(chunks);
   if (!changes.all) return chunks;
   for (const auto& [chunk, shape] : shapes) {
     if (grid.find_chunk(chunk) == nullptr) chunks.push_back(chunk);
@@ -262,6 +307,7 @@ void SolidShapes::Impl::make(const Grid& grid, IVec3 chunk, const VoxelRegistry&
   if (found == nullptr) return;
   if (options.boxes) append_solid_boxes(*found, types, made.boxes);
   if (options.faces) append_solid_faces(grid, chunk, types, made.faces);
+  append_shape_boxes(grid, chunk, types, made.of_shapes);
 }
 
 SolidShapes::SolidShapes(const SolidShapesOptions& options) : impl_(std::make_unique<Impl>()) {
@@ -274,8 +320,13 @@ SolidShapes::~SolidShapes() = default;
 std::vector<IVec3> SolidShapes::update(const Grid& grid, const VoxelRegistry& types, Threads threads) {
   Impl& me = impl_of(impl_);
   if (me.follow_types(types)) me.followed_grid = {};
+  ChangeCursor followed_data = me.followed_grid;
   PendingChanges changes(me.followed_grid, grid);
-  const std::vector<IVec3> chunks = me.chunks_to_make(grid, *changes);
+  DataChanges data;
+  if (types.has_shapes()) data = grid.data_changes_since(followed_data);
+  if (!data.empty()) me.followed_grid = {};  // until `commit`
+  if (data.all) changes->all = true;
+  const std::vector<IVec3> chunks = me.chunks_to_make(grid, *changes, data);
   std::vector<ChunkShapes> made(chunks.size());
   parallel_for(chunks.size(), threads, [&](std::size_t i) { me.make(grid, chunks[i], types, made[i]); });
   std::vector<IVec3> changed;
@@ -311,10 +362,17 @@ const QuadBuffer& SolidShapes::faces(IVec3 chunk) const {
   return found == impl_of(impl_).shapes.end() ? none : found->second.faces;
 }
 
+const std::vector<DBox>& SolidShapes::shape_boxes(IVec3 chunk) const {
+  static const std::vector<DBox> none;
+  const auto found = impl_of(impl_).shapes.find(chunk);
+  return found == impl_of(impl_).shapes.end() ? none : found->second.of_shapes;
+}
+
 std::size_t SolidShapes::bytes() const {
   std::size_t sum = impl_of(impl_).shapes.size() * sizeof(ChunkShapes);
   for (const auto& [chunk, shape] : impl_of(impl_).shapes) {
     sum += shape.boxes.capacity() * sizeof(IBox) + shape.faces.capacity() * sizeof(Quad);
+    sum += shape.of_shapes.capacity() * sizeof(DBox);
   }
   return sum;
 }

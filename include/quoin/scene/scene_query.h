@@ -121,6 +121,7 @@ struct SceneOverlap {
 /// Touching is not overlapping. Numbers that are negative or not finite, and a radius of 0, overlap nothing. A box of
 /// size 0 along some axes is a plate, a rod or a point.
 ///
+/// Shapes:  voxels with shapes are met as in `sweep_box`; the overlap names the voxel that has the shape.
 /// Fields:  cells collide as in `sweep_box`. A cell that its bounds cannot decide counts as overlapping.
 /// Cost:    O(log instances), plus, per nearby instance, the voxels within the shape's bounds until one is found.
 /// Threads: any number of threads may query at once while the tracer is not updated.

@@ -35,6 +35,9 @@ struct SweepHit {
 /// face. Among voxels hit at the same time, one with an exposed face wins. Numbers that are not finite hit nothing. A
 /// box of size 0 along some axes is a plate, a rod or a point.
 ///
+/// Shapes:  a voxel with a shape (VoxelProperties::shapes) is met as the boxes of its shape, also where they reach
+///          outside their voxel: exactly, but a tilted box, and a fluid with an inclined surface, as their bounds along
+///          the grid's axes. Elements with `collides` false do not collide. `voxel` is the one that has the shape.
 /// Fields:  a cell's solid collides if the material of any of its solid samples does, or if it has no material. The box
 ///          stops before the solid or touching it, less than 1e-5 voxels away, for any densities; less than 1e-6 voxels
 ///          deep counts as touching. If 4,000 cell parts cannot decide (a large box almost flush with an uneven

@@ -7,6 +7,9 @@
 #include <tuple>
 #include <utility>
 
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+
 #include <quoin/core/assert.h>
 
 namespace quoin {
@@ -166,6 +169,17 @@ std::size_t row_of(IVec3 local) {
 }
 
 }  // namespace
+
+DBox bounds_of(const ModelBox& box) {
+  if (!box.is_turned) return {DVec3(box.min), DVec3(box.max)};
+  const glm::dmat3 rows(DVec3(box.inverse[0]), DVec3(box.inverse[1]), DVec3(box.inverse[2]));
+  const glm::dmat3 matrix = glm::inverse(glm::transpose(rows));
+  DBox bounds;
+  for (int corner = 0; corner < 8; ++corner) {
+    bounds.extend(DVec3(box.origin) + matrix * box_corner(DBox{DVec3(box.min), DVec3(box.max)}, corner));
+  }
+  return bounds;
+}
 
 const ShapeModel* shape_at(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 local) {
   const NearVoxels voxels{chunks};

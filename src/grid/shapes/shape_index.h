@@ -23,6 +23,19 @@ struct PlacedShape {
   const ShapeModel* model = nullptr;
 };
 
+// Returns the bounds of a box of a model, in voxels: the box itself unless it is tilted.
+[[nodiscard]] DBox bounds_of(const ModelBox& box);
+
+// Calls `visit(const DBox&)` for each colliding box of a model, in voxels: for the bounds of tilted ones, and for those
+// of a fluid with an inclined surface. `with_all`: also for elements that bodies pass.
+template <class Visit>
+void visit_solid_boxes(const ShapeModel& model, bool with_all, Visit&& visit) {
+  for (const ModelBox& box : model.boxes) {
+    if (with_all || box.collides) visit(bounds_of(box));
+  }
+  if (model.free_faces != 0) visit(DBox{DVec3(model.min), DVec3(model.max)});
+}
+
 // The shaped voxels of a grid, by the voxels that they touch: a shape may reach outside its own voxel. Chunks without
 // shapes take no memory; a copy shares all chunks with the original until either is updated.
 class ShapeIndex {

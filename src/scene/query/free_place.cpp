@@ -79,7 +79,8 @@ class FreePlace {
     bool are_own = true;
     const Seen seen(tracer_, filter_, QueryTypes::Colliding);
     seen.visit_near({shape_.centre - reach, shape_.centre + reach}, [&](const PlacedGrid& placed) {
-      are_own = are_own && placed.field == nullptr && (placed.voxels->bounds().empty() || add_planes(placed));
+      are_own =
+          are_own && placed.field == nullptr && (placed.voxels->bounds().empty() || add_planes(placed, seen.types));
     });
     if (!are_own || !seen.meets_unloaded) return are_own;
     seen.visit_partial([&](const PlacedGrid& chunks) {
@@ -91,10 +92,11 @@ class FreePlace {
     return are_own;
   }
 
-  bool add_planes(const PlacedGrid& placed) {
+  bool add_planes(const PlacedGrid& placed, const TypesMet& types) {
     const ToGrid to_grid(placed);
     const DVec3 centre = to_grid.point(shape_.centre);
     const IBox bounds = placed.voxels->bounds();
+    const PlanesOfShapes of_shapes = planes_of_shapes(placed, types, centre);
     // Tolerance for overlaps caused by rounding.
     const double room = 0x1p-50 * (glm::length(shape_.centre) + glm::length(placed.position) + max_distance_);
     for (int axis = 0; axis < 3; ++axis) {
@@ -106,15 +108,39 @@ class FreePlace {
       const double reach = (half + max_distance_) / placed.voxel_size;
       const double first = std::max(std::floor(centre[of_grid] - reach), double(bounds.min[of_grid]));
       const double last = std::min(std::ceil(centre[of_grid] + reach), double(bounds.max[of_grid]));
-      for (double plane = first; plane <= last; ++plane) {
+      const auto add_plane = [&](double plane) {
         const double away = std::copysign(plane - centre[of_grid], (plane - centre[of_grid]) * direction[of_grid]);
         for (const double side : {-half, half}) {
           const double to = away * placed.voxel_size + side;
           add_place(axis, to + std::copysign(room, to));
         }
-      }
+      };
+      for (double plane = first; plane <= last; ++plane) add_plane(plane);
+      for (const double plane : of_shapes[static_cast<std::size_t>(of_grid)]) add_plane(plane);
     }
     return true;
+  }
+  // The faces of the boxes of shapes within reach, along each axis of the grid.
+  using PlanesOfShapes = std::array<std::vector<double>, 3>;
+  [[nodiscard]] PlanesOfShapes planes_of_shapes(const PlacedGrid& placed, const TypesMet& types, DVec3 centre) const {
+    PlanesOfShapes planes;
+    if (placed.shapes == nullptr) return planes;
+    const ShapeObstacles shapes(placed, types);
+    const DVec3 reach((glm::length(shape_.half_size) + max_distance_) / placed.voxel_size + 1.0);
+    const IBox cells = voxels_within({centre - reach, centre + reach}, shapes.bounds(placed.voxels->bounds()));
+    shapes.visit_touched(cells, [&](IVec3 cell) {
+      shapes.visit(cell, [&](IVec3 /*voxel*/, const DBox& box) {
+        for (int axis = 0; axis < 3; ++axis) {
+          std::vector<double>& along = planes[static_cast<std::size_t>(axis)];
+          along.insert(along.end(), {box.min[axis], box.max[axis]});
+        }
+      });
+    });
+    for (std::vector<double>& along : planes) {
+      std::sort(along.begin(), along.end());
+      along.erase(std::unique(along.begin(), along.end()), along.end());
+    }
+    return planes;
   }
   void add_place(int axis, double along) {
     if (std::abs(along) <= max_distance_) places_[static_cast<std::size_t>(axis)].push_back(along);

@@ -166,12 +166,27 @@ struct LineGap {
   DVec3 away{0.0};  ///< unit vector from the voxel to the line; 0 if they touch
 };
 
-/// Returns the distance of the line from `middle` - `half_axis` to `middle` + `half_axis` from a voxel centred at the
-/// origin.
-inline LineGap gap_of_line(const DVec3& middle, const DVec3& half_axis) {
+/// Returns the nearest point of a voxel, or a box of the grid, that is centred at the origin.
+inline DVec3 nearest_of(const DVec3& point, HalfVoxel /*half*/) {
+  return glm::clamp(point, -0.5, 0.5);
+}
+inline DVec3 nearest_of(const DVec3& point, const DVec3& half) {
+  return glm::clamp(point, -half, half);
+}
+constexpr double half_along(HalfVoxel /*half*/, int /*axis*/) {
+  return 0.5;
+}
+inline double half_along(const DVec3& half, int axis) {
+  return half[axis];
+}
+
+/// Returns the distance of the line from `middle` - `half_axis` to `middle` + `half_axis` from a voxel, or a box of the
+/// grid, centred at the origin.
+template <class Half = HalfVoxel>
+LineGap gap_of_line(const DVec3& middle, const DVec3& half_axis, const Half& half = {}) {
   const auto apart_at = [&](double t) {
     const DVec3 point = middle + t * half_axis;
-    return point - glm::clamp(point, -0.5, 0.5);
+    return point - nearest_of(point, half);
   };
   // Half of the slope of the distance's square, which only grows.
   const auto slope_at = [&](double t) { return glm::dot(apart_at(t), half_axis); };
@@ -183,7 +198,8 @@ inline LineGap gap_of_line(const DVec3& middle, const DVec3& half_axis) {
     low = high;
   } else if (below < 0.0) {
     for (int i = 0; i < 6; ++i) {
-      const double place = ((i & 1) != 0 ? 0.5 : -0.5) - middle[i >> 1];
+      const double side = half_along(half, i >> 1);
+      const double place = ((i & 1) != 0 ? side : -side) - middle[i >> 1];
       const double t = place / half_axis[i >> 1];
       if (!(t > low && t < high)) continue;
       const double slope = slope_at(t);
@@ -198,9 +214,10 @@ inline LineGap gap_of_line(const DVec3& middle, const DVec3& half_axis) {
   return {distance, distance > 0.0 ? offset / distance : DVec3(0.0)};
 }
 
-/// Returns the shortest way out of a voxel (centred at the origin) for a line that intersects it, with a negative
-/// distance.
-inline LineGap way_out_of_line(const DVec3& middle, const DVec3& half_axis) {
+/// Returns the shortest way out of a voxel, or a box of the grid, (centred at the origin) for a line that intersects it,
+/// with a negative distance.
+template <class Half = HalfVoxel>
+LineGap way_out_of_line(const DVec3& middle, const DVec3& half_axis, const Half& half = {}) {
   LineGap best{-std::numeric_limits<double>::infinity(), {}};
   for (int i = 0; i < 6; ++i) {
     DVec3 axis(0.0);
@@ -212,8 +229,7 @@ inline LineGap way_out_of_line(const DVec3& middle, const DVec3& half_axis) {
       axis /= length;
     }
     const double along = glm::dot(axis, middle);
-    const DVec3 reaches = glm::abs(axis);
-    const double reach = 0.5 * (reaches.x + reaches.y + reaches.z) + std::abs(glm::dot(axis, half_axis));
+    const double reach = reach_along(axis, half) + std::abs(glm::dot(axis, half_axis));
     const double distance = std::abs(along) - reach;
     if (distance > best.distance + 1e-12) best = {distance, along < 0.0 ? -axis : axis};
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 
@@ -99,6 +100,51 @@ class TypesMet {
   ShapeParts parts_;
 };
 
+/// The shapes of a placed grid, as bodies meet them: boxes in the grid's space. All other voxels are cubes.
+class ShapeObstacles {
+ public:
+  ShapeObstacles(const PlacedGrid& placed, const TypesMet& types) : shapes_(*placed.shapes), types_(types) {}
+
+  /// Returns the bounds of voxels and shapes. `of_voxels`: of the grid.
+  [[nodiscard]] IBox bounds(const IBox& of_voxels) const { return unite(of_voxels, shapes_.touched.bounds()); }
+  /// Returns true if the query meets voxels of a type, and they are cubes.
+  [[nodiscard]] bool is_cube_met(VoxelType type) const {
+    return types_.holds(type) && !types_.registry().is_shaped(type);
+  }
+  /// Calls `visit(voxel, box)` for each box that the query meets of the shapes that touch a cell. `voxel`: of the shape.
+  template <class Visit>
+  void visit(IVec3 cell, const Visit& visit) const {
+    for (const PlacedShape& shape : shapes_.index.at(cell)) {
+      const VoxelProperties& type = types_.registry()[shape.type];
+      if (types_.parts() == ShapeParts::Colliding && !type.collides) continue;
+      if (types_.parts() == ShapeParts::Opaque && type.visibility != Visibility::Opaque) continue;
+      const DVec3 at(shape.voxel);
+      visit_solid_boxes(*shape.model, types_.parts() != ShapeParts::Colliding, [&](const DBox& box) {
+        visit(shape.voxel, DBox{box.min + at, box.max + at});
+      });
+    }
+  }
+  /// Calls `visit(cell)` for the cells of a box that shapes touch.
+  template <class Visit>
+  void visit_touched(const IBox& cells, const Visit& visit) const {
+    const IBox box = intersect(cells, shapes_.touched.bounds());
+    for (int z = box.min.z; z < box.max.z; ++z) {
+      for (int y = box.min.y; y < box.max.y; ++y) {
+        for (int first = box.min.x & ~(kChunkEdge - 1); first < box.max.x; first += kChunkEdge) {
+          for (std::uint64_t left = shapes_.index.touched_row({first, y, z}); left != 0; left &= left - 1) {
+            const IVec3 cell{first + std::countr_zero(left), y, z};
+            if (cell.x >= box.min.x && cell.x < box.max.x) visit(cell);
+          }
+        }
+      }
+    }
+  }
+
+ private:
+  const TracedShapes& shapes_;
+  const TypesMet& types_;
+};
+
 /// The part of a scene that a filter includes.
 class Seen {
  public:
@@ -178,9 +224,20 @@ inline DVec3 reach_of_axes(const glm::dmat3& half_axes) {
   return glm::abs(half_axes[0]) + glm::abs(half_axes[1]) + glm::abs(half_axes[2]);
 }
 
-/// Returns the distance of the centres of a box and a voxel along an axis when the two touch.
-inline double reach_along(DVec3 axis, const glm::dmat3& half_axes) {
-  double reach = 0.5 * (std::abs(axis.x) + std::abs(axis.y) + std::abs(axis.z));
+/// Stands for the half size of a voxel.
+struct HalfVoxel {};
+inline double reach_along(DVec3 axis, HalfVoxel /*half*/) {
+  return 0.5 * (std::abs(axis.x) + std::abs(axis.y) + std::abs(axis.z));
+}
+/// Returns the reach of a box of the grid along an axis. `half`: its half size.
+inline double reach_along(DVec3 axis, const DVec3& half) {
+  return half.x * std::abs(axis.x) + half.y * std::abs(axis.y) + half.z * std::abs(axis.z);
+}
+
+/// Returns the distance of the centres of a box and a voxel, or a box of the grid, along an axis when the two touch.
+template <class Half = HalfVoxel>
+double reach_along(DVec3 axis, const glm::dmat3& half_axes, const Half& half = {}) {
+  double reach = reach_along(axis, half);
   for (int i = 0; i < 3; ++i) reach += std::abs(glm::dot(half_axes[i], axis));
   return reach;
 }

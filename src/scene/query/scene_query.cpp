@@ -134,6 +134,11 @@ class CapsuleInGrid {
     const LineGap gap = gap_of_line(capsule_.centre - (DVec3(voxel) + 0.5), capsule_.half_axis);
     return gap.distance < capsule_.radius - kTouch;
   }
+  [[nodiscard]] bool meets(const DBox& box) const {
+    const LineGap gap =
+        gap_of_line(capsule_.centre - 0.5 * (box.min + box.max), capsule_.half_axis, 0.5 * (box.max - box.min));
+    return gap.distance < capsule_.radius - kTouch;
+  }
   [[nodiscard]] CapsuleInField in_field() const { return {capsule_, 0.0}; }
   [[nodiscard]] CapsuleInGrid moved(DVec3 by) const {
     MovingCapsule capsule = capsule_;
@@ -149,12 +154,9 @@ class BoxInGrid {
  public:
   explicit BoxInGrid(const MovingBox& box) : box_(box), separators_(separating_axes(box.half_axes)) {}
   [[nodiscard]] DBox bounds() const { return bounds_between(box_, reach_of_axes(box_.half_axes), 0.0, 0.0); }
-  [[nodiscard]] bool meets(IVec3 voxel) const {
-    const DVec3 between = DVec3(voxel) + 0.5 - box_.centre;
-    return std::all_of(separators_.begin(), separators_.end(), [&](DVec3 axis) {
-      if (axis == DVec3(0.0)) return true;  // parallel edges: the other axes decide
-      return std::abs(glm::dot(between, axis)) < reach_along(axis, box_.half_axes) - kTouch;
-    });
+  [[nodiscard]] bool meets(IVec3 voxel) const { return meets(DVec3(voxel) + 0.5 - box_.centre, HalfVoxel{}); }
+  [[nodiscard]] bool meets(const DBox& box) const {
+    return meets(0.5 * (box.min + box.max) - box_.centre, 0.5 * (box.max - box.min));
   }
   [[nodiscard]] BoxInField in_field() const { return {box_, 0.0}; }
   [[nodiscard]] const MovingBox& box() const { return box_; }
@@ -165,6 +167,15 @@ class BoxInGrid {
   }
 
  private:
+  // `between`: from the box's centre to that of the obstacle with half size `half`.
+  template <class Half>
+  [[nodiscard]] bool meets(DVec3 between, const Half& half) const {
+    return std::all_of(separators_.begin(), separators_.end(), [&](DVec3 axis) {
+      if (axis == DVec3(0.0)) return true;  // parallel edges: the other axes decide
+      return std::abs(glm::dot(between, axis)) < reach_along(axis, box_.half_axes, half) - kTouch;
+    });
+  }
+
   MovingBox box_;
   SeparatingAxes separators_;
 };
@@ -187,25 +198,60 @@ std::optional<SceneOverlap> first_of_shape(const PlacedGrid& placed, const Types
   return std::nullopt;
 }
 
-template <class Reader, class Source>
-std::optional<SceneOverlap> first_of(const PlacedGrid& placed, const TypesMet& types, const CapsuleInGrid& capsule,
-                                     const Source& source, const IBox& tight) {
-  return first_of_shape<Reader>(placed, types, capsule, source, tight);
+// As above, among cubes and shapes.
+template <class Shape>
+std::optional<SceneOverlap> first_with_shapes(const PlacedGrid& placed, const TypesMet& types, const Shape& shape) {
+  const ShapeObstacles shapes(placed, types);
+  const IBox cells = voxels_within(shape.bounds(), shapes.bounds(placed.voxels->bounds()));
+  GridReader reader(*placed.voxels);
+  std::optional<IVec3> first;
+  const auto take = [&](IVec3 voxel) {
+    if (!first || by_zyx(voxel, *first)) first = voxel;
+  };
+  // A shape reaches at most one voxel outside its own.
+  for (int z = cells.min.z; z < cells.max.z && !(first && first->z + 1 < z); ++z) {
+    for (int y = cells.min.y; y < cells.max.y; ++y) {
+      for (int x = cells.min.x; x < cells.max.x; ++x) {
+        const IVec3 cell(x, y, z);
+        if (shapes.is_cube_met(reader.get(cell)) && shape.meets(cell)) take(cell);
+        shapes.visit(cell, [&](IVec3 voxel, const DBox& box) {
+          if (shape.meets(box)) take(voxel);
+        });
+      }
+    }
+  }
+  if (!first) return std::nullopt;
+  return SceneOverlap{placed.instance, *first, reader.get(*first)};
 }
-template <class Reader, class Source>
-std::optional<SceneOverlap> first_of(const PlacedGrid& placed, const TypesMet& types, const BoxInGrid& box,
-                                     const Source& source, const IBox& tight) {
+
+// `first_of_side(shape)`: the first overlap of a shape.
+template <class FirstOf>
+std::optional<SceneOverlap> first_of_sides(const CapsuleInGrid& capsule, const FirstOf& first_of_side) {
+  return first_of_side(capsule);
+}
+template <class FirstOf>
+std::optional<SceneOverlap> first_of_sides(const BoxInGrid& box, const FirstOf& first_of_side) {
   std::optional<SceneOverlap> first;
   visit_sides(box.box(), [&](const MovingBox& side) {
-    const auto found = first_of_shape<Reader>(placed, types, BoxInGrid(side), source, tight);
+    const auto found = first_of_side(BoxInGrid(side));
     if (!found || !first) first = found;
     return found.has_value();
   });
   return first;
 }
 
+template <class Reader, class Shape, class Source>
+std::optional<SceneOverlap> first_of(const PlacedGrid& placed, const TypesMet& types, const Shape& shape,
+                                     const Source& source, const IBox& tight) {
+  return first_of_sides(shape,
+                        [&](const auto& side) { return first_of_shape<Reader>(placed, types, side, source, tight); });
+}
+
 template <class Shape>
 std::optional<SceneOverlap> first_of_voxels(const PlacedGrid& placed, const TypesMet& types, const Shape& shape) {
+  if (placed.shapes != nullptr) {
+    return first_of_sides(shape, [&](const auto& side) { return first_with_shapes(placed, types, side); });
+  }
   return first_of<GridReader>(placed, types, shape, *placed.voxels, placed.voxels->bounds());
 }
 

@@ -3,6 +3,8 @@
 #include <array>
 #include <limits>
 
+#include <glm/vector_relational.hpp>
+
 #include <quoin/core/assert.h>
 
 #include "scene/query/field_search.h"
@@ -26,35 +28,49 @@ struct Contact {
   int axis = -1;  // grid axis of the normal; 3 and more: other axes; -1: no contact
 };
 
-// A moving box and the axes that can offset it from voxels.
+// A moving box and the axes that can offset it from voxels, and from boxes of the grid.
 class BoxAmongVoxels {
  public:
-  explicit BoxAmongVoxels(const MovingBox& box) : centre_(box.centre), axes_(separating_axes(box.half_axes)) {
+  explicit BoxAmongVoxels(const MovingBox& box)
+      : box_(box), centre_(box.centre), axes_(separating_axes(box.half_axes)) {
     for (std::size_t i = 0; i < axes_.size(); ++i) {
       reach_[i] = reach_along(axes_[i], box.half_axes);
       speed_[i] = glm::dot(box.displacement, axes_[i]);
     }
   }
-  [[nodiscard]] Contact meet(IVec3 voxel, double most) const;
+  [[nodiscard]] Contact meet(IVec3 voxel, double most) const {
+    return meet(DVec3(voxel) + 0.5 - centre_, most, [this](std::size_t i) { return reach_[i]; });
+  }
+  [[nodiscard]] Contact meet(const DBox& box, double most) const {
+    const DVec3 half = 0.5 * (box.max - box.min);
+    return meet(0.5 * (box.min + box.max) - centre_, most,
+                [&](std::size_t i) { return reach_along(axes_[i], box_.half_axes, half); });
+  }
+  [[nodiscard]] DVec3 centre_at(double fraction) const { return centre_ + fraction * box_.displacement; }
 
  private:
-  [[nodiscard]] Contact inside_contact(DVec3 between) const;
+  template <class ReachOf>
+  [[nodiscard]] Contact meet(DVec3 between, double most, const ReachOf& reach_of) const;
+  template <class ReachOf>
+  [[nodiscard]] Contact inside_contact(DVec3 between, const ReachOf& reach_of) const;
 
+  const MovingBox& box_;
   DVec3 centre_{0.0};
   SeparatingAxes axes_{};
   std::array<double, 15> reach_{};
   std::array<double, 15> speed_{};
 };
 
-// Returns the contact of a box that overlaps the voxel at the start: the direction of the shortest way out.
-Contact BoxAmongVoxels::inside_contact(DVec3 between) const {
+// Returns the contact of a box that overlaps the obstacle at the start: the direction of the shortest way out.
+template <class ReachOf>
+Contact BoxAmongVoxels::inside_contact(DVec3 between, const ReachOf& reach_of) const {
   Contact contact;
   contact.fraction = 0.0;
   contact.depth = kInfinity;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     if (axes_[i] == DVec3(0.0)) continue;
     const double offset = glm::dot(between, axes_[i]);
-    const double depth = reach_[i] - std::abs(offset);
+    const double depth = reach_of(i) - std::abs(offset);
     if (depth >= contact.depth - 1e-12) continue;
     contact.depth = depth;
     contact.normal = offset > 0.0 ? -axes_[i] : axes_[i];
@@ -63,15 +79,16 @@ Contact BoxAmongVoxels::inside_contact(DVec3 between) const {
   return contact;
 }
 
-Contact BoxAmongVoxels::meet(IVec3 voxel, double most) const {
-  const DVec3 between = DVec3(voxel) + 0.5 - centre_;
+// `between`: from the box's centre to that of the obstacle. `reach_of(i)`: of both together along axis i.
+template <class ReachOf>
+Contact BoxAmongVoxels::meet(DVec3 between, double most, const ReachOf& reach_of) const {
   Contact contact;
   double enter = -kInfinity;
   double leave = kInfinity;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     if (axes_[i] == DVec3(0.0)) continue;
     const double offset = glm::dot(between, axes_[i]);
-    const double reach = reach_[i] - kTouch;
+    const double reach = reach_of(i) - kTouch;
     const double speed = speed_[i];
     if (speed == 0.0) {
       if (std::abs(offset) >= reach) return {};
@@ -88,7 +105,7 @@ Contact BoxAmongVoxels::meet(IVec3 voxel, double most) const {
     if (enter >= leave || leave <= 0.0) return {};
   }
   if (enter > most) return {};
-  if (enter < 0.0) return inside_contact(between);
+  if (enter < 0.0) return inside_contact(between, reach_of);
   contact.fraction = enter;
   return contact;
 }
@@ -97,9 +114,17 @@ Contact BoxAmongVoxels::meet(IVec3 voxel, double most) const {
 class CapsuleAmongVoxels {
  public:
   explicit CapsuleAmongVoxels(const MovingCapsule& capsule) : capsule_(capsule) {}
-  [[nodiscard]] Contact meet(IVec3 voxel, double most) const;
+  [[nodiscard]] Contact meet(IVec3 voxel, double most) const {
+    return meet(capsule_.centre - (DVec3(voxel) + 0.5), most, HalfVoxel{});
+  }
+  [[nodiscard]] Contact meet(const DBox& box, double most) const {
+    return meet(capsule_.centre - 0.5 * (box.min + box.max), most, 0.5 * (box.max - box.min));
+  }
+  [[nodiscard]] DVec3 centre_at(double fraction) const { return capsule_.centre + fraction * capsule_.displacement; }
 
  private:
+  template <class Half>
+  [[nodiscard]] Contact meet(DVec3 offset, double most, const Half& half) const;
   [[nodiscard]] Contact contact_at(double fraction, const LineGap& gap) const;
 
   const MovingCapsule& capsule_;
@@ -113,18 +138,19 @@ Contact CapsuleAmongVoxels::contact_at(double fraction, const LineGap& gap) cons
   return contact;
 }
 
-Contact CapsuleAmongVoxels::meet(IVec3 voxel, double most) const {
+// `offset`: from the obstacle's centre to that of the capsule.
+template <class Half>
+Contact CapsuleAmongVoxels::meet(DVec3 offset, double most, const Half& half) const {
   constexpr int kMostSteps = 64;  // enough to halve a distance to nothing, as for grazing contacts
   constexpr double kMet = 1e-12;
-  const DVec3 offset = capsule_.centre - (DVec3(voxel) + 0.5);
   const double radius = capsule_.radius - kTouch;
   double fraction = 0.0;
   for (int step = 0; step < kMostSteps; ++step) {
-    LineGap gap = gap_of_line(offset + fraction * capsule_.displacement, capsule_.half_axis);
+    LineGap gap = gap_of_line(offset + fraction * capsule_.displacement, capsule_.half_axis, half);
     const double left = gap.distance - radius;
     if (step == 0 && left < 0.0) {
       // A smaller gap is a rounding error of a line through the voxel.
-      if (gap.distance < kTouch) gap = way_out_of_line(offset, capsule_.half_axis);
+      if (gap.distance < kTouch) gap = way_out_of_line(offset, capsule_.half_axis, half);
       Contact contact = contact_at(0.0, gap);
       contact.depth = capsule_.radius - gap.distance;
       return contact;
@@ -142,14 +168,16 @@ Contact CapsuleAmongVoxels::meet(IVec3 voxel, double most) const {
 template <class Shape, class Reader>
 class BlockSweep {
  public:
-  // `source`: the grid to read.
+  // `source`: the grid to read. `shapes`: null if all voxels are cubes.
   template <class Source>
-  BlockSweep(const Source& source, const IBox& bounds, const TypesMet& types, const Shape& shape)
-      : reader_(source), types_(types), shape_(shape), bounds_(bounds) {}
+  BlockSweep(const Source& source, const IBox& bounds, const TypesMet& types, const Shape& shape,
+             const ShapeObstacles* shapes)
+      : reader_(source), types_(types), shape_(shape), bounds_(bounds), shapes_(shapes) {}
 
   [[nodiscard]] const IBox& bounds() const { return bounds_; }
   [[nodiscard]] double fraction() const { return best_.fraction; }
   void check(const IBox& near, double /*from*/, double /*to*/) {
+    if (shapes_ != nullptr) return check_cells(near);
     for (int z = near.min.z; z < near.max.z; ++z) {
       for (int y = near.min.y; y < near.max.y; ++y) {
         for (int x = near.min.x; x < near.max.x; ++x) check_voxel({x, y, z});
@@ -166,7 +194,27 @@ class BlockSweep {
     if (!types_.holds(reader_.get(voxel))) return;
     const Contact contact = shape_.meet(voxel, std::min(best_.fraction + kAtOnce, 1.0));
     if (contact.axis < 0) return;
-    const bool is_exposed = faces_air(voxel, contact);
+    take(voxel, contact, faces_air(voxel, contact));
+  }
+
+  // As `check`, among cubes and shapes.
+  void check_cells(const IBox& near) {
+    for (int z = near.min.z; z < near.max.z; ++z) {
+      for (int y = near.min.y; y < near.max.y; ++y) {
+        for (int x = near.min.x; x < near.max.x; ++x) {
+          const IVec3 cell{x, y, z};
+          if (shapes_->is_cube_met(reader_.get(cell))) check_box(cell, DBox{DVec3(cell), DVec3(cell) + 1.0});
+          shapes_->visit(cell, [&](IVec3 voxel, const DBox& box) { check_box(voxel, box); });
+        }
+      }
+    }
+  }
+  void check_box(IVec3 voxel, const DBox& box) {
+    const Contact contact = shape_.meet(box, std::min(best_.fraction + kAtOnce, 1.0));
+    if (contact.axis >= 0) take(voxel, contact, faces_air(box, contact));
+  }
+
+  void take(IVec3 voxel, const Contact& contact, bool is_exposed) {
     const bool is_earlier = contact.fraction < best_.fraction - kAtOnce;
     const bool is_deeper = contact.depth > best_.depth;
     if (!is_earlier && !(is_exposed && !best_is_exposed_) && !(is_exposed == best_is_exposed_ && is_deeper)) return;
@@ -183,11 +231,27 @@ class BlockSweep {
     before[contact.axis] += contact.normal[contact.axis] > 0.0 ? 1 : -1;
     return !types_.holds(reader_.get(before));
   }
+  // As above, for a box: at the point of the hit face that is nearest to the shape's centre.
+  [[nodiscard]] bool faces_air(const DBox& box, const Contact& contact) {
+    constexpr double kInside = 1e-4;  // from the face's edges, so that the point is in front of this face only
+    if (contact.axis >= 3) return true;
+    const DVec3 room = glm::min(DVec3(kInside), 0.5 * (box.max - box.min));
+    DVec3 point = glm::clamp(shape_.centre_at(contact.fraction), box.min + room, box.max - room);
+    const bool is_upper = contact.normal[contact.axis] > 0.0;
+    point[contact.axis] = is_upper ? box.max[contact.axis] + 1e-6 : box.min[contact.axis] - 1e-6;
+    const IVec3 cell(glm::floor(point));
+    bool is_covered = shapes_->is_cube_met(reader_.get(cell));
+    shapes_->visit(cell, [&](IVec3 /*voxel*/, const DBox& other) {
+      is_covered |= glm::all(glm::greaterThan(point, other.min)) && glm::all(glm::lessThan(point, other.max));
+    });
+    return !is_covered;
+  }
 
   Reader reader_;
   const TypesMet& types_;
   const Shape& shape_;
   IBox bounds_;
+  const ShapeObstacles* shapes_;
   Contact best_;
   IVec3 voxel_{0};
   bool best_is_exposed_ = false;
@@ -208,11 +272,11 @@ bool is_sooner(const SweepHit& hit, const std::optional<SweepHit>& first) {
 // The first contact with voxels, up to the fraction `most`.
 template <class Reader, class Source>
 std::optional<SweepHit> first_of(const PlacedGrid& placed, const TypesMet& types, const MovingBox& box, double most,
-                                 const Source& source, const IBox& bounds) {
+                                 const Source& source, const IBox& bounds, const ShapeObstacles* shapes) {
   std::optional<SweepHit> last;
   visit_sides(box, [&](const MovingBox& side) {
     const BoxAmongVoxels shape(side);
-    BlockSweep<BoxAmongVoxels, Reader> sweep(source, bounds, types, shape);
+    BlockSweep<BoxAmongVoxels, Reader> sweep(source, bounds, types, shape, shapes);
     follow_way(side, most, sweep);
     const Contact& best = sweep.best();
     const bool is_met = best.axis >= 0;
@@ -228,9 +292,9 @@ std::optional<SweepHit> first_of(const PlacedGrid& placed, const TypesMet& types
 
 template <class Reader, class Source>
 std::optional<SweepHit> first_of(const PlacedGrid& placed, const TypesMet& types, const MovingCapsule& capsule,
-                                 double most, const Source& source, const IBox& bounds) {
+                                 double most, const Source& source, const IBox& bounds, const ShapeObstacles* shapes) {
   const CapsuleAmongVoxels shape(capsule);
-  BlockSweep<CapsuleAmongVoxels, Reader> sweep(source, bounds, types, shape);
+  BlockSweep<CapsuleAmongVoxels, Reader> sweep(source, bounds, types, shape, shapes);
   follow_way(capsule, most, sweep);
   if (sweep.best().axis < 0) return std::nullopt;
   return hit_of(placed, sweep);
@@ -240,7 +304,12 @@ std::optional<SweepHit> first_of(const PlacedGrid& placed, const TypesMet& types
 template <class Moving>
 std::optional<SweepHit> first_of_voxels(const PlacedGrid& placed, const TypesMet& types, const Moving& shape,
                                         double most) {
-  return first_of<GridReader>(placed, types, shape, most, *placed.voxels, placed.voxels->bounds());
+  const IBox bounds = placed.voxels->bounds();
+  if (placed.shapes == nullptr) {
+    return first_of<GridReader>(placed, types, shape, most, *placed.voxels, bounds, nullptr);
+  }
+  const ShapeObstacles shapes(placed, types);
+  return first_of<GridReader>(placed, types, shape, most, *placed.voxels, shapes.bounds(bounds), &shapes);
 }
 
 // Returns the first contact with an unloaded chunk, for a shape in chunk units.
@@ -254,7 +323,7 @@ std::optional<SweepHit> first_of_unloaded(const PlacedGrid& chunks, const Moving
     Moving moved = shape;
     moved.centre += offset;
     const double until = first ? first->fraction : most;
-    const auto hit = first_of<UnloadedReader>(chunks, all, moved, until, reader, extent_of(*chunks.grid));
+    const auto hit = first_of<UnloadedReader>(chunks, all, moved, until, reader, extent_of(*chunks.grid), nullptr);
     if (hit && is_sooner(*hit, first)) first = hit;
   });
   if (!first) return std::nullopt;
