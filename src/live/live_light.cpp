@@ -36,12 +36,12 @@ std::unique_ptr<LitScene> LightWorker::make(States::Request request) {
   return nullptr;
 }
 
-// Returns true if light depends on any change since the last call; `with_data`: or meshes do. Scenes also report names
-// and other voxel data.
+// Returns true if light depends on any change since the last call; `with_data`: or meshes do. Light depends on data if
+// types have shapes. Scenes also report names and other voxel data.
 bool LightWorker::read_changes(const Scene& scene, bool with_data) {
   PendingChanges types(followed_types_, scene.types);
   PendingChanges changes(followed_scene_, scene, changes_);
-  with_data &= scene.types.has_remesh_on_data();
+  with_data = (with_data && scene.types.has_remesh_on_data()) || scene.types.has_shapes();
   bool is_any = changes->all || !types->empty();
   if (changes->all) {
     followed_grids_.clear();

@@ -64,6 +64,9 @@ struct PropagatedLightOptions {
 ///          transparent type that blocks light, at the same cost, and stays there (VoxelProperties::blocks_light); a
 ///          channel in which such a type emits keeps the type's own level.
 /// Lamps:   a type's level applies in its own voxel and spreads from there, even if the voxel is opaque.
+/// Shapes:  light passes between two voxels unless a shape of opaque material covers the common side of either wholly
+///          (ShapeModel::covers_side): a slab stops light downwards, a door behind it. This also applies to the light
+///          of lamps with shapes. A type that sets `blocks_light` stops light as a cube, or not at all.
 /// Colours: a transparent type passes a channel of lamp light if that channel of its colour is at least half its
 ///          greatest channel. It always passes sky light. An opaque type that light passes does so for all channels.
 /// Exact:   the result equals a search from every lamp and every sky column (Dijkstra), independent of the order of
@@ -83,8 +86,8 @@ class PropagatedLight {
   PropagatedLight& operator=(PropagatedLight&&) noexcept;
   ~PropagatedLight();
 
-  /// Applies the edits since the last update. Recomputes everything for another grid, or when the transparency, light
-  /// properties or emission of types changed. If it throws (bad_alloc), the next update starts from scratch.
+  /// Applies the edits since the last update, and changes of data if types have shapes. Recomputes everything for
+  /// another grid, or when the transparency, shapes, light properties or emission of types changed. If it throws (bad_alloc), the next update starts from scratch.
   void update(const Grid& grid, const VoxelRegistry& types, Threads threads = {});
 
   /// Returns a copy of the current light. The two are independent. A cursor of one is also valid in the other until the

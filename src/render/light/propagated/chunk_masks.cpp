@@ -27,6 +27,41 @@ LightLevels lamp_levels(const VoxelProperties& properties) {
   return {0, level(colour.r), level(colour.g), level(colour.b)};
 }
 
+CoveredSides::CoveredSides(const Grid& grid, const VoxelRegistry* types, const std::vector<TypeLight>& lights,
+                           IVec3 chunk)
+    : types_(types) {
+  const Chunk* voxels = types == nullptr ? nullptr : grid.find_chunk(chunk);
+  if (voxels == nullptr) return;
+  for (const VoxelType type : voxels->types()) {
+    if (type < lights.size() && lights[type].has_sides) shaped_.push_back(type);
+  }
+  if (!shaped_.empty()) near_ = grid.neighbourhood(chunk);
+}
+
+std::uint64_t CoveredSides::row(int y, int z) const {
+  std::uint64_t found = 0;
+  for (const VoxelType type : shaped_) found |= near_.centre()->row_mask(y, z, type);
+  return found;
+}
+
+DirectionSet CoveredSides::at(IVec3 local) const {
+  DirectionSet covered;
+  const ShapeModel* model = shape_at(near_, *types_, local);
+  QUOIN_ASSERT(model != nullptr, "a voxel with a shape");
+  for (const Direction side : kDirections) {
+    if (model->covers_side[static_cast<std::size_t>(side)]) covered.insert(side);
+  }
+  return covered;
+}
+
+std::uint64_t CoveredSides::covered(int y, int z, Direction side, std::uint64_t where) const {
+  std::uint64_t found = 0;
+  for (std::uint64_t left = where & (none() ? 0 : row(y, z)); left != 0; left &= left - 1) {
+    if (at({std::countr_zero(left), y, z}).contains(side)) found |= left & (~left + 1);
+  }
+  return found;
+}
+
 void set_passage(const VoxelRegistry& types, VoxelType type, unsigned colours, TypeLight& light) {
   constexpr unsigned kOfSky = 1U << kSky;
   const unsigned cost = types[type].light_cost;
@@ -46,6 +81,9 @@ void set_passage(const VoxelRegistry& types, VoxelType type, unsigned colours, T
   light.passes = static_cast<std::uint8_t>(passes);
   light.tolls = static_cast<std::uint8_t>(tolls);
   light.cost = static_cast<std::uint8_t>(tolls == 0 ? 1 : std::max(cost, 1U));
+  const VoxelProperties& properties = types[type];
+  light.has_sides =
+      types.is_shaped(type) && properties.visibility == Visibility::Opaque && !properties.blocks_light.has_value();
 }
 
 namespace {
@@ -133,10 +171,28 @@ void ChunkMasks::read_lamps(const Chunk& voxels, const std::vector<TypeLight>& t
   }
 }
 
-void ChunkMasks::read(const Chunk* voxels, const std::vector<TypeLight>& types, const IBox& box,
-                      const SlabSet& lamp_slabs) {
+void ChunkMasks::read_sides(const CoveredSides& sides, const IBox& box) {
+  const std::uint64_t inside = box.empty() ? 0 : kAll >> (kChunkEdge - box.size().x) << box.min.x;
+  for (int z = box.min.z; z < box.max.z; ++z) {
+    for (int y = box.min.y; y < box.max.y; ++y) {
+      SideRow row{static_cast<std::uint8_t>(y), static_cast<std::uint8_t>(z), {}};
+      bool is_any = false;
+      for (std::uint64_t left = sides.row(y, z) & inside; left != 0; left &= left - 1) {
+        for (const Direction side : sides.at({std::countr_zero(left), y, z})) {
+          row.covered[static_cast<std::size_t>(side)] |= left & (~left + 1);
+          is_any = true;
+        }
+      }
+      if (is_any) side_rows_.push_back(row);
+    }
+  }
+}
+
+void ChunkMasks::read(const Chunk* voxels, const std::vector<TypeLight>& types, const CoveredSides& sides,
+                      const IBox& box, const SlabSet& lamp_slabs) {
   QUOIN_ASSERT(intersect(box, kWholeChunk) == box, "a box of the chunk");
   lamps_.clear();
+  side_rows_.clear();
   toll_count_ = 0;
   without_lamps_.fill(0);
   rows_of_.fill(0);
@@ -156,6 +212,7 @@ void ChunkMasks::read(const Chunk* voxels, const std::vector<TypeLight>& types, 
   }
   read_lamps(*voxels, types, box, lamp_slabs);
   read_tolls(*voxels, types, box);
+  if (!sides.none()) read_sides(sides, box);
 }
 
 namespace {
@@ -177,13 +234,43 @@ int fall_in_slab(const trace::SlabRows& stops, int begin, int end, std::uint64_t
 
 }  // namespace
 
-int fall(const Chunk* voxels, const std::vector<TypeLight>& types, int begin, int end, ColumnSet& open) {
+namespace {
+
+// Lets columns fall row by row, past sides of shapes.
+int fall_past_sides(const trace::ChunkRows& stops, const CoveredSides& sides, int begin, int end, ColumnSet& open) {
+  trace::SlabRows rows;
+  int low = end;
+  for (int first_z = 0; first_z < kChunkEdge; first_z += 4) {
+    std::uint64_t* columns = open.data() + first_z;
+    for (int first_y = (end - 1) & ~3; first_y > begin - 4; first_y -= 4) {
+      if ((columns[0] | columns[1] | columns[2] | columns[3]) == 0) break;
+      const trace::Slab kind = stops.read(first_y, first_z, rows);
+      if (kind != trace::Slab::Mixed) rows.fill(kind == trace::Slab::Full ? kAll : 0);
+      for (int z = 0; z < 4; ++z) {
+        for (int y = std::min(end, first_y + 4); y-- > std::max(begin, first_y) && columns[z] != 0;) {
+          columns[z] &= ~rows[static_cast<std::size_t>((y & 3) + 4 * z)];
+          columns[z] &= ~sides.covered(y, first_z + z, Direction::PosY, columns[z]);
+          if (columns[z] == 0) break;
+          low = std::min(low, y);
+          columns[z] &= ~sides.covered(y, first_z + z, Direction::NegY, columns[z]);
+        }
+      }
+    }
+  }
+  return low;
+}
+
+}  // namespace
+
+int fall(const Chunk* voxels, const std::vector<TypeLight>& types, const CoveredSides& sides, int begin, int end,
+         ColumnSet& open) {
   QUOIN_ASSERT(begin >= 0 && begin < end && end <= kChunkEdge, "rows of a chunk");
   if (!is_any(open)) return end;
   const auto is_stop = [&](VoxelType type) { return !passes(types, type, kSky); };
   const FunctionRef<bool(VoxelType)> asked(is_stop);
   if (voxels == nullptr) return begin;
   const trace::ChunkRows stops(*voxels, asked);
+  if (!sides.none()) return fall_past_sides(stops, sides, begin, end, open);
   if (stops.none()) return begin;
   int low = end;
   trace::SlabRows rows;

@@ -10,6 +10,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/memory.h>
 #include <quoin/grid/chunk.h>
+#include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/render/propagated_light.h>
 
@@ -28,7 +29,8 @@ struct TypeLight {
   std::uint8_t passes = 15;  ///< bit c: channel c passes, and loses one level per step; light of the sky falls freely
   std::uint8_t tolls = 0;    ///< bit c: channel c enters and loses `cost` levels
   std::uint8_t cost = 1;
-  bool absorbs = false;  ///< light that enters does not leave
+  bool absorbs = false;    ///< light that enters does not leave
+  bool has_sides = false;  ///< its shapes may cover sides, through which no light passes
 
   bool operator==(const TypeLight&) const = default;
 };
@@ -46,6 +48,27 @@ void set_passage(const VoxelRegistry& types, VoxelType type, unsigned colours, T
   return type == kAir || (light_of(types, type).passes >> channel & 1U) != 0;
 }
 
+/// Finds the sides that shapes of a chunk cover, through which no light passes.
+class CoveredSides {
+ public:
+  /// `types`: null if no type covers sides. Lifetime: that of grid, types and lights. Cost: O(types of the chunk).
+  CoveredSides(const Grid& grid, const VoxelRegistry* types, const std::vector<TypeLight>& lights, IVec3 chunk);
+
+  /// Returns true if no shape of the chunk covers a side.
+  [[nodiscard]] bool none() const { return shaped_.empty(); }
+  /// Returns the voxels of a row whose shapes may cover sides.
+  [[nodiscard]] std::uint64_t row(int y, int z) const;
+  /// Returns the covered sides of a voxel of such a row.
+  [[nodiscard]] DirectionSet at(IVec3 local) const;
+  /// Returns the voxels of a row, of those in `where`, that cover a side.
+  [[nodiscard]] std::uint64_t covered(int y, int z, Direction side, std::uint64_t where) const;
+
+ private:
+  const VoxelRegistry* types_;
+  std::vector<VoxelType> shaped_;
+  Neighbourhood near_{};
+};
+
 /// Columns of voxels in a column of chunks: [z % 64], bit x % 64.
 using ColumnSet = std::array<std::uint64_t, kChunkEdge>;
 
@@ -53,10 +76,11 @@ using ColumnSet = std::array<std::uint64_t, kChunkEdge>;
   return std::any_of(columns.begin(), columns.end(), [](std::uint64_t row) { return row != 0; });
 }
 
-/// Lets sky columns fall from row `end` to row `begin` of a chunk. Removes the columns that stop. Returns the lowest
-/// row reached, or `end` if there is none. `voxels`: null if all is air.
+/// Lets sky columns fall from row `end` to row `begin` of a chunk, and out of it. Removes the columns that stop. Returns
+/// the lowest row reached, or `end` if there is none. `voxels`: null if all is air. `sides`: of the chunk.
 /// Cost: O(rows of 64 voxels until all columns stop); O(types) if none stops sky light.
-int fall(const Chunk* voxels, const std::vector<TypeLight>& types, int begin, int end, ColumnSet& open);
+int fall(const Chunk* voxels, const std::vector<TypeLight>& types, const CoveredSides& sides, int begin, int end,
+         ColumnSet& open);
 
 /// Masks of a box of a chunk: the voxels that light passes and the lamps. Reused between calls: buffers only grow.
 class ChunkMasks {
@@ -65,6 +89,12 @@ class ChunkMasks {
     std::uint8_t y, z;
     std::uint16_t lamp;  // packed levels
     std::uint64_t where;
+  };
+
+  /// A row with voxels that cover sides.
+  struct SideRow {
+    std::uint8_t y, z;
+    std::array<std::uint64_t, 6> covered;  // by Direction
   };
 
   /// The voxels that light of some channels enters at a cost of one kind.
@@ -80,9 +110,10 @@ class ChunkMasks {
     [[nodiscard]] const std::uint64_t* rows() const { return is_uniform ? nullptr : words.data(); }
   };
 
-  /// `voxels`: null if all is air. `lamp_slabs`: all slabs with lamps, maybe more. Unregistered types are opaque. Cost:
-  /// O(rows of the box).
-  void read(const Chunk* voxels, const std::vector<TypeLight>& types, const IBox& box, const SlabSet& lamp_slabs);
+  /// `voxels`: null if all is air. `sides`: of the chunk. `lamp_slabs`: all slabs with lamps, maybe more. Unregistered
+  /// types are opaque. Cost: O(rows of the box, and voxels of it whose shapes may cover sides).
+  void read(const Chunk* voxels, const std::vector<TypeLight>& types, const CoveredSides& sides, const IBox& box,
+            const SlabSet& lamp_slabs);
 
   /// Returns the rows of the box, [y + 64 z]; null if all are `uniform`.
   [[nodiscard]] const std::uint64_t* rows(std::size_t channel) const {
@@ -102,6 +133,8 @@ class ChunkMasks {
   [[nodiscard]] std::span<const LampRow> lamps() const { return lamps_; }
   /// The voxels that are in no row of a channel, but that its light enters.
   [[nodiscard]] std::span<const Toll> tolls() const { return {tolls_.data(), toll_count_}; }
+  /// The rows of the box with covered sides.
+  [[nodiscard]] std::span<const SideRow> side_rows() const { return side_rows_; }
   /// Returns the voxels of a row that light of a channel enters and does not leave.
   [[nodiscard]] std::uint64_t absorbing(std::size_t channel, int y, int z) const {
     std::uint64_t found = 0;
@@ -124,10 +157,12 @@ class ChunkMasks {
   void read_tolls(const Chunk& voxels, const std::vector<TypeLight>& types, const IBox& box);
   void read_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, const IBox& box, const SlabSet& slabs);
   void add_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, int y, int z, std::uint64_t where);
+  void read_sides(const CoveredSides& sides, const IBox& box);
 
   std::array<Rows, kChannels> rows_;
   std::array<std::size_t, kChannels> rows_of_{};  // [channel]: which of them
   BlockVector<LampRow> lamps_;
+  BlockVector<SideRow> side_rows_;
   std::vector<Toll> tolls_;  // the first `toll_count_` are in use
   std::size_t toll_count_ = 0;
   SlabSet without_lamps_{};

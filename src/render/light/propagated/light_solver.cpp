@@ -361,6 +361,42 @@ void LightSolver::read_pass(std::size_t channel) {
   });
 }
 
+// Closes sides towards the next lower voxels along an axis. `where`: voxels of the chunk row that starts at `first`.
+void LightSolver::close_sides(int axis, IVec3 first, std::uint64_t where) {
+  const IVec3 p = first - origin_;
+  if (p.y > size_.y + 1 || p.z > size_.z + 1) return;
+  QUOIN_ASSERT(p.y >= 0 && p.z >= 0, "a row of the region or its rim");
+  const auto close = [&](int column, std::uint64_t bits) {
+    if (bits == 0 || column < 0 || column >= static_cast<int>(columns_)) return;
+    open_sides_[static_cast<std::size_t>(axis)][static_cast<std::size_t>(p.z) * layer_ +
+                                                static_cast<std::size_t>(column) * column_ +
+                                                static_cast<std::size_t>(p.y)] &= ~bits;
+  };
+  const int bit = p.x & 63;
+  close(p.x >> 6, where << bit);
+  if (bit != 0) close((p.x >> 6) + 1, where >> (64 - bit));
+}
+
+// Sets the masks of open sides.
+void LightSolver::read_sides() {
+  if (!has_sides_) return;
+  const std::size_t words = (static_cast<std::size_t>(size_.z) + 2) * layer_ + 1;
+  for (BlockVector<std::uint64_t>& sides : open_sides_) sides.assign(words, kAll);
+  for_each_part({box_.voxels.min - 1, box_.voxels.max + 1}, [&](const Part& part) {
+    if (!part.around->is_held || part.around->masks == nullptr) return;
+    for (const ChunkMasks::SideRow& row : part.around->masks->side_rows()) {
+      if (!part.box.contains({part.box.min.x, row.y, row.z})) continue;
+      const IVec3 first = part.chunk * kChunkEdge + IVec3(0, row.y, row.z);
+      for (const Direction side : kDirections) {
+        const FaceFrame& frame = frame_of(side);
+        IVec3 upper = first;  // the side is that between the voxel `upper` and the next lower one
+        if (frame.sign > 0) ++upper[frame.axis];
+        close_sides(frame.axis, upper, row.covered[static_cast<std::size_t>(side)] & part.bits);
+      }
+    }
+  });
+}
+
 // Sets the tolls of a channel.
 void LightSolver::read_tolls(std::size_t channel) {
   toll_count_ = 0;
@@ -466,16 +502,22 @@ std::uint64_t LightSolver::blocks_near_front(std::size_t z) const {
 }
 
 // Makes sources of the voxels of a block that the front reaches. They are not at the region's rim.
+template <bool kHasSides>
 void LightSolver::pay_toll(Toll& toll, std::size_t z, unsigned block, BlockVector<Source>& out) {
   const std::size_t first = z * layer_ + block * kBlockRows;
   const std::size_t column = block / blocks_;
   for (std::size_t at = first; at < first + kBlockRows; ++at) {
     if (toll.left[at] == 0) continue;
     const std::uint64_t own = front_[at];
-    std::uint64_t around = own << 1 | own >> 1 | front_[at - 1] | front_[at + 1];
-    around |= front_[at - layer_] | front_[at + layer_];
-    if (column > 0) around |= front_[at - column_] >> 63;
-    if (column + 1 < columns_) around |= front_[at + column_] << 63;
+    const auto open = [&](std::size_t axis, std::size_t word) {
+      if constexpr (kHasSides) return open_sides_[axis][word];
+      return kAll;
+    };
+    std::uint64_t around = (own << 1 & open(0, at)) | (own & open(0, at)) >> 1;
+    around |= (front_[at - 1] & open(1, at)) | (front_[at + 1] & open(1, at + 1));
+    around |= (front_[at - layer_] & open(2, at)) | (front_[at + layer_] & open(2, at + layer_));
+    if (column > 0) around |= front_[at - column_] >> 63 & open(0, at);
+    if (column + 1 < columns_) around |= (front_[at + column_] & open(0, at + column_)) << 63;
     const std::uint64_t reached = around & toll.left[at];
     if (reached == 0) continue;
     toll.left[at] &= ~reached;
@@ -493,7 +535,8 @@ void LightSolver::pay_tolls(std::size_t channel, unsigned level) {
     BlockVector<Source>& out = toll.absorbs ? absorbed_[reached] : sources_[channel][reached];
     for (std::size_t z = 1; z <= static_cast<std::size_t>(size_.z); ++z) {
       for (std::uint64_t left = blocks_near_front(z) & toll.blocks[z]; left != 0; left &= left - 1) {
-        pay_toll(toll, z, static_cast<unsigned>(std::countr_zero(left)), out);
+        const auto block = static_cast<unsigned>(std::countr_zero(left));
+        has_sides_ ? pay_toll<true>(toll, z, block, out) : pay_toll<false>(toll, z, block, out);
       }
     }
   }
@@ -517,6 +560,7 @@ LevelPass LightSolver::step_to(unsigned level) {
                  column_,
                  touched_.size(),
                  pass_.data(),
+                 {},
                  rest_.data(),
                  front_.data(),
                  next_.data(),
@@ -530,6 +574,7 @@ LevelPass LightSolver::step_to(unsigned level) {
                  touched_.data(),
                  open_.data()};
   for (std::size_t plane = 0; plane < kPlanes; ++plane) step.planes[plane] = planes_[plane];
+  for (std::size_t axis = 0; has_sides_ && axis < 3; ++axis) step.open_sides[axis] = open_sides_[axis].data();
   return step;
 }
 
@@ -688,6 +733,7 @@ void LightSolver::solve(const LightRegion::Box& box, unsigned channels, std::vec
   has_sky_ = false;
   read_rim();
   read_inside();
+  read_sides();
   std::size_t passes = kChannels;  // the channel stored in `pass_`
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     if ((channels >> channel & 1U) == 0) continue;
@@ -713,6 +759,9 @@ void LightSolver::solve(const LightRegion& region, std::vector<ChunkLightChange>
   QUOIN_ASSERT(fits(region.all.voxels.size()), "a region that is not too large");
   QUOIN_ASSERT(region.around.size() == region.index(region.chunks.max - 1) + 1, "a chunk for each index");
   region_ = &region;
+  has_sides_ = std::ranges::any_of(region.around, [](const ChunkAround& around) {
+    return around.masks != nullptr && !around.masks->side_rows().empty();
+  });
   has_tolls_ = std::ranges::any_of(region.around, [](const ChunkAround& around) {
     return around.masks != nullptr && !around.masks->tolls().empty();
   });

@@ -81,6 +81,9 @@ struct LightRegion {
 /// voxel its final level, since no voxel is lit by a lower one. Sky light of level 15 falls first. Each level processes
 /// only the blocks of rows next to blocks that contain the previous level.
 ///
+/// Covered sides of shapes stop light between two voxels: a mask per axis says where the side towards the next lower
+/// voxel is open. Regions without covered sides do not read these masks.
+///
 /// Voxels that cost more, or that light does not leave, are in none of these sets. A front of level L that reaches one
 /// makes it a source of level L - cost: the first front is the highest, so each becomes a source once.
 ///
@@ -131,11 +134,14 @@ class LightSolver {
   void open(const Part& part);
   void read_inside();
   void read_pass(std::size_t channel);
+  void read_sides();
+  void close_sides(int axis, IVec3 first, std::uint64_t where);
   void put_rows(const Part& part, const std::uint64_t* rows, std::uint64_t uniform, BlockVector<std::uint64_t>& to);
   void find_passable();
   void add_sky(IVec3 first, std::uint64_t where);
   void read_tolls(std::size_t channel);
   void pay_tolls(std::size_t channel, unsigned level);
+  template <bool kHasSides>
   void pay_toll(Toll& toll, std::size_t z, unsigned block, BlockVector<Source>& out);
   [[nodiscard]] std::uint64_t blocks_near_front(std::size_t z) const;
   void touch(const Source& source);
@@ -169,13 +175,15 @@ class LightSolver {
   std::size_t layer_ = 0;
   std::array<std::array<BlockVector<Source>, 16>, kChannels> sources_;  // [channel][level]
   std::vector<std::unique_ptr<ChunkMasks>> own_masks_;
-  bool has_tolls_ = false;                        // some chunk of the region has any
-  std::vector<Toll> tolls_;                       // the first `toll_count_` are in use
-  std::size_t toll_count_ = 0;                    // of the channel
-  BlockVector<std::uint64_t> lit_tolls_;          // with tolls: voxels that are sources and were lit
-  std::array<BlockVector<Source>, 16> absorbed_;  // [level]: voxels that absorb light
-  bool has_sky_ = false;                          // there is sky light that is not in `sources_`
-  bool is_clean_ = true;                          // `front_`, `next_` and `absorbed_` are empty: no region failed
+  std::array<BlockVector<std::uint64_t>, 3> open_sides_;  // by axis, see LevelPass
+  bool has_sides_ = false;                                // some chunk of the region has covered sides
+  bool has_tolls_ = false;                                // some chunk of the region has any
+  std::vector<Toll> tolls_;                               // the first `toll_count_` are in use
+  std::size_t toll_count_ = 0;                            // of the channel
+  BlockVector<std::uint64_t> lit_tolls_;                  // with tolls: voxels that are sources and were lit
+  std::array<BlockVector<Source>, 16> absorbed_;          // [level]: voxels that absorb light
+  bool has_sky_ = false;                                  // there is sky light that is not in `sources_`
+  bool is_clean_ = true;  // `front_`, `next_` and `absorbed_` are empty: no region failed
   BlockVector<std::uint64_t> pass_;
   BlockVector<std::uint64_t> rest_;   // dark voxels of pass_, in touched blocks
   BlockVector<std::uint64_t> front_;  // voxels of the current level; all 0 between regions

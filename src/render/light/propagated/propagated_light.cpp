@@ -35,6 +35,7 @@ using propagated::ChunkAround;
 using propagated::ChunkLightChange;
 using propagated::ChunkMasks;
 using propagated::ColumnSet;
+using propagated::CoveredSides;
 using propagated::fall;
 using propagated::is_any;
 using propagated::kAllChannels;
@@ -71,15 +72,21 @@ std::vector<TypeLight> type_lights(const VoxelRegistry& types, const PropagatedL
     const int half = (std::max({colour.r, colour.g, colour.b}) + 1) / 2;
     const int tinted = 1 | (colour.r >= half) << 1 | (colour.g >= half) << 2 | (colour.b >= half) << 3;
     // Light passes an opaque type where the type leaves room, not through its material.
-    const unsigned colours = types.is_transparent(type) ? static_cast<unsigned>(tinted) : propagated::kAllChannels;
+    const bool is_clear = properties.visibility == Visibility::Transparent;  // the material of shapes
+    const unsigned colours = is_clear ? static_cast<unsigned>(tinted) : propagated::kAllChannels;
     propagated::set_passage(types, type, colours, lights[i]);
   }
   return lights;
 }
 
-// Returns the number of voxels around a region whose types the solver needs: it skips light that does not leave them.
+bool has_sides(const std::vector<TypeLight>& lights) {
+  return std::ranges::any_of(lights, &TypeLight::has_sides);
+}
+
+// Returns the number of voxels around a region whose types the solver needs: it skips light that does not leave them,
+// or not on the side of the region.
 int rim_of(const std::vector<TypeLight>& lights) {
-  return std::ranges::any_of(lights, &TypeLight::absorbs) ? 1 : 0;
+  return has_sides(lights) || std::ranges::any_of(lights, &TypeLight::absorbs) ? 1 : 0;
 }
 
 // Returns bit c for each channel in which a chunk has lamps.
@@ -103,6 +110,7 @@ struct LightState {
   const LightStore& store;
   const LightDomain& domain;
   const std::vector<TypeLight>& types;
+  const VoxelRegistry* shapes;  // null if no type covers sides
 };
 
 // Voxels of one chunk that changed, or a chunk that enters or leaves the domain.
@@ -232,6 +240,19 @@ ColumnSet open_columns(const LightState& state, const IBox& voxels, int y) {
   return open;
 }
 
+// Returns the columns of a box through which the sky's light falls out of the row at height y.
+ColumnSet falling_columns(const LightState& state, const Grid& grid, const IBox& voxels, int y) {
+  ColumnSet open = open_columns(state, voxels, y);
+  if (state.shapes == nullptr) return open;
+  const IVec3 first{voxels.min.x, y, voxels.min.z};
+  const CoveredSides sides(grid, state.shapes, state.types, chunk_of(first));
+  for (int z = 0; z < kChunkEdge && !sides.none(); ++z) {
+    std::uint64_t& row = open[static_cast<std::size_t>(z)];
+    row &= ~sides.covered(local_of(first).y, z, Direction::NegY, row);
+  }
+  return open;
+}
+
 // Returns a box of a chunk around columns, from row `begin` to row `end`.
 IBox box_of(const ColumnSet& columns, int begin, int end) {
   std::uint64_t x = 0;
@@ -251,7 +272,11 @@ void follow_columns(const LightState& state, const Grid& grid, const LightEdit& 
   IVec3 chunk = chunk_of(edit.voxels.min);
   int top = local_of(edit.voxels.min).y;
   ColumnSet columns = edit.above;
-  fall(grid.find_chunk(chunk), state.types, top, top + edit.voxels.size().y, columns);
+  const auto fall_to = [&](int begin, int end) {
+    const CoveredSides sides(grid, state.shapes, state.types, chunk);
+    return fall(grid.find_chunk(chunk), state.types, sides, begin, end, columns);
+  };
+  fall_to(top, top + edit.voxels.size().y);
   for (std::size_t z = 0; z < columns.size(); ++z) columns[z] ^= edit.below[z];
   const LightDomain::Range range = state.domain.range(chunk.x, chunk.z);
   while (range.begin != range.end && is_any(columns)) {
@@ -261,7 +286,7 @@ void follow_columns(const LightState& state, const Grid& grid, const LightEdit& 
     }
     if (chunk.y < range.begin) return;
     IBox reached = box_of(columns, 0, top);
-    reached.min.y = fall(grid.find_chunk(chunk), state.types, 0, top, columns);
+    reached.min.y = fall_to(0, top);
     const IVec3 low = chunk * kChunkEdge;
     if (!reached.empty()) visit(IBox{reached.min + low, reached.max + low});
     top = 0;
@@ -331,7 +356,7 @@ LightEdit edit_of(const LightState& state, const Grid& grid, const IBox& voxels)
   LightEdit edit;
   edit.voxels = voxels;
   edit.highest = highest_levels(state, grid, voxels);
-  edit.above = open_columns(state, voxels, voxels.max.y);
+  edit.above = falling_columns(state, grid, voxels, voxels.max.y);
   edit.below = open_columns(state, voxels, voxels.min.y - 1);
   return edit;
 }
@@ -351,7 +376,7 @@ LightEdit edit_of_entering(const LightState& state, const Grid& grid, IVec3 chun
 bool is_below_open_sky(const LightState& state, const Grid& grid, IVec3 chunk) {
   if (grid.find_chunk(chunk) != nullptr) return false;
   const IVec3 low = chunk * kChunkEdge;
-  const ColumnSet open = open_columns(state, {low, low + kChunkEdge}, low.y + kChunkEdge);
+  const ColumnSet open = falling_columns(state, grid, {low, low + kChunkEdge}, low.y + kChunkEdge);
   return std::all_of(open.begin(), open.end(), [](std::uint64_t row) { return row == kAll; });
 }
 
@@ -420,9 +445,11 @@ struct PropagatedLight::Impl {
   [[nodiscard]] LightReader reader() const { return {store, domain()}; }
   void follow_types(const VoxelRegistry& types);
   void begin_anew(const Grid& grid);
-  void take_over(const Grid& grid, const GridChanges& changes);
-  [[nodiscard]] LightState state() const { return {store, domain(), lights()}; }
-  [[nodiscard]] std::optional<LightEdit> edit_of(const Grid& grid, const ChunkChange& change) const;
+  void take_over(const Grid& grid, const GridChanges& changes, const DataChanges& data);
+  [[nodiscard]] LightState state() const { return {store, domain(), lights(), shapes}; }
+  [[nodiscard]] std::map<IVec3, IBox, ByZyx> boxes_with_shapes(const Grid& grid, const GridChanges& changes,
+                                                               const DataChanges& data) const;
+  [[nodiscard]] std::optional<LightEdit> edit_of(const Grid& grid, IVec3 chunk, const IBox& changed) const;
   void change_domain(const Grid& grid, const std::vector<IVec3>& chunks, BlockVector<LightEdit>& edits);
   void light_entering(const Grid& grid);
   void solve_dirty(const Grid& grid, Threads threads);
@@ -435,6 +462,7 @@ struct PropagatedLight::Impl {
   PropagatedLightOptions options;
   ChangeCursor followed_grid;
   ChangeCursor followed_types;
+  const VoxelRegistry* shapes = nullptr;  // during an update: the types, or null if none covers sides
   std::shared_ptr<const std::vector<TypeLight>> shared_lights = std::make_shared<const std::vector<TypeLight>>();
   int rim = 0;  // see rim_of
   LightDomain columns;
@@ -452,7 +480,12 @@ void PropagatedLight::Impl::follow_types(const VoxelRegistry& types) {
   PendingChanges changes(followed_types, types);
   if (changes->empty()) return;
   std::vector<TypeLight> now = type_lights(types, options);
-  if (now != lights()) {
+  const auto is_reshaped = [&](const TypeChange& change) {
+    return change.shape_changed && propagated::light_of(now, change.type).has_sides;
+  };
+  const bool has_reshaped =
+      changes->all ? has_sides(now) : std::ranges::any_of(changes->items_unless_all(), is_reshaped);
+  if (has_reshaped || now != lights()) {
     followed_grid = {};
     rim = rim_of(now);
     shared_lights = std::make_shared<const std::vector<TypeLight>>(std::move(now));
@@ -485,13 +518,12 @@ void PropagatedLight::Impl::begin_anew(const Grid& grid) {
 
 // Returns the edit of a chunk that changed. None: the chunk was air and still is, or it was dark (see change_domain).
 // Uses the domain before the edit.
-std::optional<LightEdit> PropagatedLight::Impl::edit_of(const Grid& grid, const ChunkChange& change) const {
-  const Chunk* const now = grid.find_chunk(change.chunk);
-  const bool had_voxels = domain().has_voxels(change.chunk);
-  if (!had_voxels && (now == nullptr || (!domain().holds(change.chunk) && domain().beyond(change.chunk) == 0)))
-    return {};
-  const IVec3 low = change.chunk * kChunkEdge;
-  const IBox box = had_voxels ? change.box : intersect(change.box, now->bounds());
+std::optional<LightEdit> PropagatedLight::Impl::edit_of(const Grid& grid, IVec3 chunk, const IBox& changed) const {
+  const Chunk* const now = grid.find_chunk(chunk);
+  const bool had_voxels = domain().has_voxels(chunk);
+  if (!had_voxels && (now == nullptr || (!domain().holds(chunk) && domain().beyond(chunk) == 0))) return {};
+  const IVec3 low = chunk * kChunkEdge;
+  const IBox box = had_voxels ? changed : intersect(changed, now->bounds());
   LightEdit edit = quoin::edit_of(state(), grid, {box.min + low, box.max + low});
   if (!had_voxels) edit.raised = lamp_channels(*now, lights());
   if (now == nullptr) edit.lowered &= ~(1U << kSky);
@@ -562,13 +594,38 @@ void PropagatedLight::Impl::light_entering(const Grid& grid) {
   propagated::sort_boxes(dirty, queue, domain());
 }
 
-void PropagatedLight::Impl::take_over(const Grid& grid, const GridChanges& changes) {
+// Returns the changed boxes of chunks, with the voxels whose shapes may cover other sides than before: those with other
+// data, and neighbours of changed voxels.
+std::map<IVec3, IBox, ByZyx> PropagatedLight::Impl::boxes_with_shapes(const Grid& grid, const GridChanges& changes,
+                                                                      const DataChanges& data) const {
+  std::map<IVec3, IBox, ByZyx> boxes;
+  const auto add = [&](IVec3 chunk, const IBox& box) {
+    const IVec3 low = chunk * kChunkEdge;
+    for_each_chunk({box.min + low - 1, box.max + low + 1}, [&](IVec3 other, const IBox& part) {
+      if (!CoveredSides(grid, shapes, lights(), other).none()) boxes[other] = unite(boxes[other], part);
+    });
+  };
+  for (const DataChange& change : data.items_unless_all()) add(change.chunk, change.box);
+  for (const ChunkChange& change : changes.items_unless_all()) {
+    add(change.chunk, change.box);
+    boxes[change.chunk] = unite(boxes[change.chunk], change.box);
+  }
+  return boxes;
+}
+
+void PropagatedLight::Impl::take_over(const Grid& grid, const GridChanges& changes, const DataChanges& data) {
   std::vector<IVec3> chunks;
   BlockVector<LightEdit> edits;
+  const auto add = [&](IVec3 chunk, const IBox& box) {
+    if (std::optional<LightEdit> edit = edit_of(grid, chunk, box)) edits.push_back(*edit);
+  };
   for (const ChunkChange& change : changes.items_unless_all()) {
     chunks.push_back(change.chunk);
     store.add_lamps(change.chunk, change.slabs);
-    if (std::optional<LightEdit> edit = edit_of(grid, change)) edits.push_back(*edit);
+    if (shapes == nullptr) add(change.chunk, change.box);
+  }
+  if (shapes != nullptr) {
+    for (const auto& [chunk, box] : boxes_with_shapes(grid, changes, data)) add(chunk, box);
   }
   change_domain(grid, chunks, edits);
   for (const LightEdit& edit : edits) add_reach(state(), grid, edit, dirty);
@@ -642,7 +699,8 @@ void PropagatedLight::Impl::solve_dirty(const Grid& grid, Threads threads) {
           if (!around.is_held) continue;
           ChunkMasks& read = solver.own_masks(i++);
           around.masks = &read;
-          read.read(grid.find_chunk(chunk), lights(), intersect({voxels.min - low, voxels.max - low}, kWholeChunk),
+          read.read(grid.find_chunk(chunk), lights(), CoveredSides(grid, shapes, lights(), chunk),
+                    intersect({voxels.min - low, voxels.max - low}, kWholeChunk),
                     around.light == nullptr ? propagated::all_slabs() : around.light->lamp_slabs);
         }
       }
@@ -682,7 +740,7 @@ void PropagatedLight::Impl::read_masks(const Grid& grid, const std::vector<Light
   parallel_for(missing.size(), threads, [&](std::size_t i) {
     const auto& [chunk, known] = missing[i];
     const LightChunk* light = store.find(chunk);
-    known->masks.read(grid.find_chunk(chunk), lights(), known->read,
+    known->masks.read(grid.find_chunk(chunk), lights(), CoveredSides(grid, shapes, lights(), chunk), known->read,
                       light == nullptr ? propagated::all_slabs() : light->lamp_slabs);
   });
 }
@@ -711,8 +769,13 @@ PropagatedLight::~PropagatedLight() = default;
 void PropagatedLight::update(const Grid& grid, const VoxelRegistry& types, Threads threads) {
   Impl& me = impl_of(impl_);
   me.follow_types(types);
+  me.shapes = has_sides(me.lights()) ? &types : nullptr;
+  ChangeCursor followed_data = me.followed_grid;
   PendingChanges changes(me.followed_grid, grid);
-  changes->all ? me.begin_anew(grid) : me.take_over(grid, *changes);
+  DataChanges data;
+  if (me.shapes != nullptr) data = grid.data_changes_since(followed_data);
+  if (!data.empty()) me.followed_grid = {};  // until `commit`
+  changes->all || data.all ? me.begin_anew(grid) : me.take_over(grid, *changes, data);
   me.solve_dirty(grid, threads);
   me.solve_queue(grid, threads);
   if (!me.entering.empty()) {

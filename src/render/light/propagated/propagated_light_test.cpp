@@ -67,6 +67,48 @@ VoxelRegistry light_types() {
   return types;
 }
 
+// As `light_types`, and then types with shapes.
+VoxelRegistry shaped_types() {
+  VoxelRegistry types = light_types();
+  const auto add = [&](VoxelProperties properties, VoxelShapes shapes) {
+    properties.colour = {180, 20, 180, 255};
+    properties.shapes = std::move(shapes);
+    properties.state_bits = 3;
+    if (properties.orientations.empty()) properties.orientations = StateOrientations::to_directions();
+    EXPECT_TRUE(types.add(properties));
+  };
+  const VoxelShape slab = VoxelShape::box({0, 0, 0}, {16, 8, 16});
+  add({.name = "slab"}, slab);
+  add({.name = "glass slab", .visibility = Visibility::Transparent}, slab);
+  add({.name = "glowing slab", .emission = 0.7F}, slab);
+  add({.name = "thick slab", .light_cost = 3}, slab);
+  add({.name = "dark slab", .blocks_light = true}, slab);
+  add({.name = "light slab", .blocks_light = false}, slab);
+  add({.name = "door", .orientations = StateOrientations::about_y()}, VoxelShape::box({13, 0, 0}, {16, 16, 16}));
+  add({.name = "corner"}, VoxelShape::boxes({{{0, 0, 0}, {16, 2, 16}}, {{0, 0, 0}, {2, 16, 16}}}));
+  add({.name = "full"}, VoxelShape::box({0, 0, 0}, {16, 16, 16}));
+  std::vector<ShapePart> plates = {{.shape = VoxelShape::box({6, 6, 6}, {10, 10, 10})}};
+  for (const AxisOrientation& turn : StateOrientations::to_directions().by_value) {
+    plates.push_back({.shape = VoxelShape::box({0, 15, 0}, {16, 16, 16}),
+                      .orientation = turn,
+                      .when = {{.connected = {turn.apply(Direction::PosY)}}}});
+  }
+  add({.name = "plates"},
+      *VoxelShapes::from_rules({.parts = std::move(plates), .neighbours = ShapeNeighbours::Connected}));
+  const auto quarter = [](int x, int z) { return VoxelShape::box({x, 8, z}, {x + 8, 16, z + 8}); };
+  const auto at = [](StairCorner corner) { return ShapeCondition{.corner = corner}; };
+  using enum StairCorner;
+  add({.name = "stairs", .orientations = StateOrientations::about_y_and_upside_down()},
+      *VoxelShapes::from_rules(
+          {.parts = {{.shape = slab},
+                     {.shape = quarter(8, 0), .when = {at(Straight), at(OuterLeft), at(InnerLeft), at(InnerRight)}},
+                     {.shape = quarter(8, 8), .when = {at(Straight), at(OuterRight), at(InnerLeft), at(InnerRight)}},
+                     {.shape = quarter(0, 0), .when = {at(InnerLeft)}},
+                     {.shape = quarter(0, 8), .when = {at(InnerRight)}}},
+           .neighbours = ShapeNeighbours::Stairs}));
+  return types;
+}
+
 /// Searches from every lamp and all of the sky, level by level, one voxel at a time. Its box contains all voxels plus
 /// the range of light, so that light from outside reaches a voxel in the middle only as sky light.
 class Search {
@@ -93,14 +135,24 @@ class Search {
     if (type == kAir) return true;
     if (type >= types_.size()) return false;
     const VoxelProperties& properties = types_[type];
-    if (properties.blocks_light.value_or(properties.visibility == Visibility::Opaque)) {
+    if (properties.blocks_light.value_or(is_opaque(properties))) {
       // Light enters only where faces behind it show, and where it has no light of its own.
-      return properties.visibility == Visibility::Transparent && lamp(type, channel) == 0;
+      return !is_opaque(properties) && lamp(type, channel) == 0;
     }
     const Rgba8& colour = types_[type].colour;
     const std::array<int, 3> rgb{colour.r, colour.g, colour.b};
     return channel == 0 || properties.visibility == Visibility::Opaque ||
            2 * rgb.at(static_cast<std::size_t>(channel) - 1) >= *std::max_element(rgb.begin(), rgb.end());
+  }
+  [[nodiscard]] static bool is_opaque(const VoxelProperties& properties) {
+    return properties.shapes.empty() && properties.visibility == Visibility::Opaque;
+  }
+  // Returns true if the shape of a voxel covers a side.
+  [[nodiscard]] bool covers(IVec3 voxel, Direction side) const {
+    const VoxelType type = grid_.get(voxel);
+    if (type >= types_.size() || types_[type].shapes.empty()) return false;
+    if (types_[type].visibility != Visibility::Opaque || types_[type].blocks_light) return false;
+    return shape_at(grid_, types_, voxel)->covers_side.at(static_cast<std::size_t>(side));
   }
   [[nodiscard]] int lamp(VoxelType type, int channel) const {
     const LightLevels lamp = propagated::lamp_levels(types_[type]);
@@ -110,7 +162,7 @@ class Search {
   // Returns true if light that entered the voxel stays in it.
   [[nodiscard]] bool absorbs(IVec3 voxel, int channel) const {
     const VoxelType type = grid_.get(voxel);
-    return type != kAir && type < types_.size() && types_[type].visibility == Visibility::Transparent &&
+    return type != kAir && type < types_.size() && !is_opaque(types_[type]) &&
            types_[type].blocks_light.value_or(false) && lamp(type, channel) == 0;
   }
   [[nodiscard]] int cost(IVec3 voxel) const {
@@ -136,7 +188,10 @@ class Search {
         if (levels_[index(voxel)][c] != level || absorbs(voxel, channel)) continue;
         for (const Direction direction : kDirections) {
           const IVec3 next = voxel + normal_of(direction);
-          if (!box_.contains(next) || !passes(next, channel)) continue;
+          if (!box_.contains(next) || !passes(next, channel) || covers(voxel, direction) ||
+              covers(next, static_cast<Direction>(static_cast<int>(direction) ^ 1))) {
+            continue;
+          }
           const bool falls = channel == 0 && level == 15 && direction == Direction::NegY && !absorbs(next, channel);
           raise(next, level - std::max(cost(next), falls ? 0 : 1));
         }
@@ -228,6 +283,81 @@ TEST(PropagatedLight, MatchesSearchAfterRandomEdits) {
       ASSERT_EQ(light.at(at), fresh.at(at));
     }
   }
+}
+
+// Edits of types, of states alone, and of both, in a labyrinth of shapes and in the open.
+TEST(PropagatedLight, StopsAtCoveredSidesAfterRandomEdits) {
+  const std::vector<InstructionSet> sets = sets_of_this_machine();
+  const VoxelRegistry types = shaped_types();
+  for (unsigned seed = 0; seed < static_cast<unsigned>(cases(3, 24)); ++seed) {
+    SCOPED_TRACE(seed);
+    const InstructionSetOverride set(sets[seed % sets.size()]);
+    std::mt19937 random(seed);
+    const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
+    Grid grid;
+    if (seed % 2 == 0) grid.fill_box({{40, 50, 50}, {90, 75, 80}}, kStone);
+    PropagatedLight light;
+    for (int step = 0; step < 9; ++step) {
+      const int count = step == 0 ? 6'000 : 1 + below(30);
+      for (int i = 0; i < count; ++i) {
+        const IVec3 at{48 + below(34), 54 + below(18), 54 + below(20)};
+        const auto type =
+            static_cast<VoxelType>(step == 0 || below(2) == 0 ? below(static_cast<int>(types.size())) : 0);
+        if (step > 0 && below(3) > 0) {
+          grid.set_data(at, {.state = random() % 8});
+        } else {
+          grid.set(at, type, {.state = random() % 8});
+        }
+      }
+      light.update(grid, types, {1 + seed % 2});
+      if (step % 4 == 0) expect_searched(light, grid, types);
+      if (HasFatalFailure()) return;
+    }
+  }
+}
+
+TEST(PropagatedLight, FollowsADoorASlabAndReplacedShapes) {
+  VoxelRegistry types = light_types();
+  VoxelProperties door{.name = "door",
+                       .state_bits = 2,
+                       .orientations = StateOrientations::about_y(),
+                       .shapes = VoxelShape::box({13, 0, 0}, {16, 16, 16})};
+  const VoxelType kDoor = *types.add(door);
+  const VoxelType kSlab = *types.add({.name = "slab", .shapes = VoxelShape::box({0, 0, 0}, {16, 8, 16})});
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {20, 12, 12}}, kStone);
+  grid.fill_box({{2, 2, 5}, {18, 4, 6}}, kAir);
+  grid.set({3, 2, 5}, kLamp);
+  grid.set({9, 2, 5}, kDoor, {.state = 0});
+  grid.set({9, 3, 5}, kDoor, {.state = 0});
+  PropagatedLight light;
+  light.update(grid, types);
+  EXPECT_EQ(light.at({9, 2, 5}).red, 9);
+  EXPECT_EQ(light.at({10, 2, 5}).red, 0) << "a closed door";
+  for (const std::uint32_t state : {1U, 0U, 3U, 2U, 1U}) {
+    grid.set_data({9, 2, 5}, {.state = state});
+    grid.set_data({9, 3, 5}, {.state = state});
+    light.update(grid, types);
+    EXPECT_EQ(light.at({10, 2, 5}).red, state % 2 == 1 ? 8 : 0) << "state " << state;
+    expect_searched(light, grid, types);
+  }
+  // Sky light stops at the lower side of a slab, and lights the slab's own voxel.
+  grid.set({-5, 100, 5}, kSlab);
+  light.update(grid, types);
+  EXPECT_EQ(light.at({-5, 100, 5}).sky, 15);
+  EXPECT_EQ(light.at({-5, 99, 5}).sky, 14);
+  expect_searched(light, grid, types);
+  door.shapes = VoxelShape::box({13, 0, 0}, {16, 15, 16});
+  types.replace(kDoor, door);
+  light.update(grid, types);
+  expect_searched(light, grid, types);
+  // An override makes a door stop all light.
+  door.blocks_light = true;
+  types.replace(kDoor, door);
+  EXPECT_TRUE(types.blocks_light(kDoor));
+  light.update(grid, types);
+  EXPECT_EQ(light.at({10, 2, 5}).red, 0);
+  expect_searched(light, grid, types);
 }
 
 // Mostly edits single voxels, so that neither rock nor air prevails.

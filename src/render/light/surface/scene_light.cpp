@@ -20,7 +20,8 @@ struct SceneLight::Entry {
         voxels(other.voxels == &other.both ? &both : other.voxels),
         both(other.both.snapshot()),
         followed_voxels(other.followed_voxels),
-        followed_field(other.followed_field) {}
+        followed_field(other.followed_field),
+        has_shapes(other.has_shapes) {}
   Entry& operator=(const Entry&) = delete;
 
   PropagatedLight light;
@@ -28,9 +29,10 @@ struct SceneLight::Entry {
   Grid both;                     // union of voxels and field, if there is a field
   ChangeCursor followed_voxels;
   ChangeCursor followed_field;
+  bool has_shapes = false;  // `both` follows the voxels' data
 
   void update(const SceneGrid& grid, const VoxelRegistry& types, Threads threads);
-  void unite(const SceneGrid& grid);
+  void unite(const SceneGrid& grid, const VoxelRegistry& types);
 };
 
 namespace {
@@ -55,22 +57,30 @@ Chunk united_chunk(const Chunk* voxels, const DensityChunk* field) {
       }
     }
   }
-  return Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense));
+  Chunk united = Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense));
+  all.for_each_data([&](IVec3 local, const VoxelData& data) { united.set_data(local, {.state = data.state}); });
+  return united;
 }
 
 }  // namespace
 
-void SceneLight::Entry::unite(const SceneGrid& grid) {
+void SceneLight::Entry::unite(const SceneGrid& grid, const VoxelRegistry& types) {
   std::vector<IVec3> chunks;
+  if (std::exchange(has_shapes, types.has_shapes()) != types.has_shapes()) followed_voxels = {};
+  ChangeCursor followed_data = followed_voxels;
   PendingChanges of_voxels(followed_voxels, grid.grid);
   PendingChanges of_field(followed_field, grid.field);
-  if (of_voxels->all || of_field->all) {
+  DataChanges of_data;
+  if (has_shapes) of_data = grid.grid.data_changes_since(followed_data);
+  if (!of_data.empty()) followed_voxels = {};  // until `commit`
+  if (of_voxels->all || of_field->all || of_data.all) {
     both.clear();
     for (const std::vector<IVec3>& more : {grid.grid.chunks(), grid.field.chunks()}) {
       chunks.insert(chunks.end(), more.begin(), more.end());
     }
   } else {
     for (const auto& change : of_voxels->items_unless_all()) chunks.push_back(change.chunk);
+    for (const auto& change : of_data.items_unless_all()) chunks.push_back(change.chunk);
     for (const auto& change : of_field->items_unless_all()) chunks.push_back(change.chunk);
   }
   sort_and_unite(chunks);
@@ -83,7 +93,7 @@ void SceneLight::Entry::unite(const SceneGrid& grid) {
 
 void SceneLight::Entry::update(const SceneGrid& grid, const VoxelRegistry& types, Threads threads) {
   const bool has_field = grid.field.chunk_count() > 0;
-  if (has_field) unite(grid);
+  if (has_field) unite(grid, types);
   voxels = has_field ? &both : &grid.grid;
   light.update(*voxels, types, threads);
 }

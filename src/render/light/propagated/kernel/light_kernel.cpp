@@ -52,16 +52,29 @@ inline void clear_block(std::uint64_t* to) {
 
 // Writes the voxels that light reaches in a block to `next`. Returns true if there are any. Reads words next to the
 // region: these are dark, or belong to the rim of another row, through which no light passes.
-template <bool kIsWide>
+template <bool kIsWide, bool kHasSides>
 inline bool reach_in_block(const LevelPass& step, std::size_t at, bool is_touched) {
   const std::uint64_t* dark = (is_touched ? step.rest : step.pass) + at;
   Words all{};
   for (std::size_t i = 0; i < kBlockRows; i += kWidth) {
     const std::uint64_t* here = step.front + at + i;
     const Words own = load(here);
-    Words around = own << 1 | own >> 1 | load(here - 1) | load(here + 1);
-    around |= load(here - step.layer) | load(here + step.layer);
-    if constexpr (kIsWide) around |= load(here - step.column) >> 63 | load(here + step.column) << 63;
+    Words around;
+    if constexpr (kHasSides) {
+      const std::uint64_t* x = step.open_sides[0] + at + i;
+      const std::uint64_t* y = step.open_sides[1] + at + i;
+      const std::uint64_t* z = step.open_sides[2] + at + i;
+      around = (own << 1 & load(x)) | (own & load(x)) >> 1;
+      around |= (load(here - 1) & load(y)) | (load(here + 1) & load(y + 1));
+      around |= (load(here - step.layer) & load(z)) | (load(here + step.layer) & load(z + step.layer));
+      if constexpr (kIsWide) {
+        around |= (load(here - step.column) >> 63 & load(x)) | (load(here + step.column) & load(x + step.column)) << 63;
+      }
+    } else {
+      around = own << 1 | own >> 1 | load(here - 1) | load(here + 1);
+      around |= load(here - step.layer) | load(here + step.layer);
+      if constexpr (kIsWide) around |= load(here - step.column) >> 63 | load(here + step.column) << 63;
+    }
     const Words fresh = around & load(dark + i);
     store(step.next + at + i, fresh);
     all |= fresh;
@@ -85,7 +98,7 @@ inline bool light_block(const LevelPass& step, std::size_t at, bool is_touched, 
 }
 
 // Uses two loops, so that the first has no unpredictable branch.
-template <bool kIsWide>
+template <bool kIsWide, bool kHasSides>
 void spread_layers(const LevelPass& of) {
   const LevelPass step = of;  // so that no store is to one of its members
   for (std::size_t z = 0; z < step.layers; ++z) {
@@ -96,7 +109,7 @@ void spread_layers(const LevelPass& of) {
     std::uint64_t changed = 0;
     for (std::uint64_t active = step.active[z]; active != 0; active &= active - 1) {
       const std::uint64_t block = active & (~active + 1);
-      const bool is_changed = reach_in_block<kIsWide>(step, place(active), (touched & block) != 0);
+      const bool is_changed = reach_in_block<kIsWide, kHasSides>(step, place(active), (touched & block) != 0);
       changed |= is_changed ? block : 0;
     }
     for (std::uint64_t old = step.changed[z] & ~step.active[z]; old != 0; old &= old - 1) {
@@ -117,7 +130,12 @@ void spread_layers(const LevelPass& of) {
 
 void spread(const LevelPass& step) {
   QUOIN_ASSERT(step.level > 0 && step.level < 15 && step.layers >= 2, "a level below the highest, and two rims");
-  step.layer == step.column ? spread_layers<false>(step) : spread_layers<true>(step);
+  const bool is_wide = step.layer != step.column;
+  if (step.open_sides[0] != nullptr) {
+    is_wide ? spread_layers<true, true>(step) : spread_layers<false, true>(step);
+  } else {
+    is_wide ? spread_layers<true, false>(step) : spread_layers<false, false>(step);
+  }
 }
 
 template <std::size_t kBy, std::size_t... kLanes>
@@ -175,6 +193,7 @@ inline bool has_bits(const std::uint64_t* words, std::size_t count) {
 }
 
 // Returns true if some wanted voxels stay dark in a layer with sky light.
+template <bool kHasSides>
 bool take_sky_of_layer(const LevelPass& step, std::size_t z) {
   QUOIN_ASSERT(step.layer / kBlockRows <= 64 && step.layer % step.column == 0, "at most 64 blocks, in whole columns");
   Words shade{};
@@ -191,7 +210,9 @@ bool take_sky_of_layer(const LevelPass& step, std::size_t z) {
     // The top row of a column belongs to the rim: no light falls from one column to another.
     for (std::size_t part = kBlockRows / kWidth; part-- > 0;) {
       const Words pass = load(step.pass + at + part * kWidth);
-      lit[part] = fall(load(step.front + at + part * kWidth), pass, from_above);
+      Words enters = pass;
+      if constexpr (kHasSides) enters &= load(step.open_sides[1] + at + part * kWidth + 1);
+      lit[part] = fall(load(step.front + at + part * kWidth), enters, from_above);
       from_above = lit[part][0];
       dark[part] = pass & ~lit[part];
       all_lit |= lit[part];
@@ -209,17 +230,22 @@ bool take_sky_of_layer(const LevelPass& step, std::size_t z) {
   return any(shade);
 }
 
-bool take_sky(const LevelPass& of) {
+template <bool kHasSides>
+bool take_sky_of_layers(const LevelPass& of) {
   const LevelPass step = of;
   bool is_shady = false;
   for (std::size_t z = 0; z < step.layers; ++z) {
     if (has_bits(step.front + z * step.layer, step.layer)) {
-      is_shady |= take_sky_of_layer(step, z);
+      is_shady |= take_sky_of_layer<kHasSides>(step, z);
     } else {
       is_shady |= z >= step.wanted_z && z < step.wanted_end_z && (step.wanted & step.open[z]) != 0;
     }
   }
   return is_shady;
+}
+
+bool take_sky(const LevelPass& step) {
+  return step.open_sides[1] != nullptr ? take_sky_of_layers<true>(step) : take_sky_of_layers<false>(step);
 }
 
 std::uint64_t find_blocks(const std::uint64_t* words, std::size_t count) {
