@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -205,6 +206,11 @@ class BoxCopy {
         orientation_(orientation),
         source_(box_from(box)),
         has_data_(from.data_count() != 0 || to.data_count() != 0) {
+    const VoxelRegistry* types = options.types;
+    if (orientation != AxisOrientation() && !options.map_state && types != nullptr && types->has_turned_by_state()) {
+      turning_ = types;
+      has_data_ = true;
+    }
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::size_t along = source_axis(axis);
       origin_[axis] = to_min[static_cast<int>(axis)];
@@ -322,7 +328,9 @@ class BoxCopy {
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
         for (int x = chunks.min.x; x < chunks.max.x; ++x) {
           const Chunk* const chunk = from_.find_chunk(x, y, z);
-          if (chunk == nullptr || chunk->data_count() == 0) continue;
+          if (chunk == nullptr) continue;
+          if (turning_ != nullptr) turn_states({x, y, z}, *chunk, all);
+          if (chunk->data_count() == 0) continue;
           chunk->for_each_data([&](IVec3 local, const VoxelData& data) {
             const IVec3 voxel = IVec3{x, y, z} * kChunkEdge + local;
             if (all.contains(voxel)) put_data(voxel, data);
@@ -331,12 +339,35 @@ class BoxCopy {
       }
     }
   }
+  // Sets the states of voxels without data whose type the state turns: state 0 is an orientation too.
+  void turn_states(IVec3 at, const Chunk& chunk, const IBox& source) {
+    const IVec3 first = at * kChunkEdge;
+    const IBox part = intersect({source.min - first, source.max - first}, kWholeChunk);
+    for (const VoxelType type : chunk.types()) {
+      const VoxelType is_now = mapped(type);
+      if (!turning_->is_turned_by_state(is_now) || (*turning_)[is_now].orientations.turned(0, orientation_) == 0)
+        continue;
+      for (int z = part.min.z; z < part.max.z; ++z) {
+        for (int y = part.min.y; y < part.max.y; ++y) {
+          for (std::uint64_t left = chunk.row_mask(y, z, type); left != 0; left &= left - 1) {
+            const IVec3 local{std::countr_zero(left), y, z};
+            if (part.contains(local) && chunk.data(local).empty()) put_data(first + local, {});
+          }
+        }
+      }
+    }
+  }
   void put_data(IVec3 source, const VoxelData& data) {
     const VoxelType type = mapped(from_.get(source));
     if (type == kAir) return;
     const IVec3 voxel = narrowed(target_of(box_of_voxel(source))).min;
-    const bool is_mapped = data.state != 0 && options_.map_state != nullptr;
-    to_.set_data(voxel, {is_mapped ? options_.map_state(type, data.state) : data.state, data.bytes});
+    std::uint32_t state = data.state;
+    if (turning_ != nullptr && turning_->is_turned_by_state(type)) {
+      state = (*turning_)[type].orientations.turned(state, orientation_);
+    } else if (state != 0 && options_.map_state != nullptr) {
+      state = options_.map_state(type, state);
+    }
+    to_.set_data(voxel, {state, data.bytes});
   }
   static LongBox box_of_voxel(IVec3 voxel) { return box_from({voxel, voxel + 1}); }
   [[nodiscard]] IVec3 source_of(IVec3 voxel) const { return narrowed(source_of(box_of_voxel(voxel))).min; }
@@ -440,6 +471,7 @@ class BoxCopy {
   LongBox target_;
   TurnedBlock block_;
   bool has_data_;
+  const VoxelRegistry* turning_ = nullptr;  // if orientations of types turn with the copy
   std::int64_t changed_ = 0;
 };
 

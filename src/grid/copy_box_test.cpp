@@ -155,6 +155,54 @@ TEST(CopyBox, FourTurnsRestoreBox) {
   }
 }
 
+TEST(CopyBox, TurnsStatesOfTypesWithOrientations) {
+  VoxelRegistry types;
+  const VoxelType stone = *types.add({.name = "stone", .state_bits = 4});
+  const VoxelType log = *types.add({.state_bits = 2, .orientations = StateOrientations::along_axes()});
+  const VoxelType torch = *types.add({.state_bits = 4, .orientations = StateOrientations::to_directions(1)});
+  const VoxelType stairs = *types.add({.state_bits = 3, .orientations = StateOrientations::about_y_and_upside_down()});
+  const std::vector<VoxelType> type_map = {kAir, stone, log, stairs, stairs};
+  for (int i = 0; i < AxisOrientation::kCount; ++i) {
+    SCOPED_TRACE(i);
+    RandomBoxes random(static_cast<unsigned>(i));
+    const AxisOrientation turn = AxisOrientation::at(i);
+    Grid from;
+    Grid to;
+    to.fill_box({{0, 0, 0}, {20, 20, 20}}, torch);
+    to.set_data({1, 1, 1}, {.state = 9});
+    if (i % 2 == 0) from.fill_box({{0, 0, 0}, {64, 64, 64}}, stairs);
+    for (int k = 0; k < 300; ++k) {
+      const auto state = static_cast<std::uint32_t>(random.below(3) == 0 ? 0 : random.below(8));
+      from.set(random.place(20), static_cast<VoxelType>(random.below(5)), {.state = state});
+    }
+    CopyOptions options;
+    options.types = &types;
+    if (i % 3 == 0) options.type_map = type_map;
+    const IBox box{{-20, -15, -18}, {20, 20, 15}};
+    copy_box(from, box, to, {3, -2, 60}, turn, options);
+    for (int z = box.min.z; z < box.max.z; ++z) {
+      for (int y = box.min.y; y < box.max.y; ++y) {
+        for (int x = box.min.x; x < box.max.x; ++x) {
+          VoxelType type = from.get(x, y, z);
+          if (i % 3 == 0) type = type_map[type];
+          const IVec3 at = target_of({x, y, z}, box, {3, -2, 60}, turn);
+          ASSERT_EQ(to.get(at), type);
+          const std::uint32_t state = from.data({x, y, z}).state;
+          const bool is_turned = i != AxisOrientation().index() && !types[type].orientations.empty();
+          ASSERT_EQ(to.data(at).state, is_turned ? types[type].orientations.turned(state, turn) : state)
+              << "type " << type << " state " << state;
+        }
+      }
+    }
+    // A map of the caller's own replaces the turn.
+    options.map_state = [](VoxelType, std::uint32_t state) { return state ^ 1U; };
+    Grid own;
+    copy_box(from, box, own, {0, 0, 0}, turn, options);
+    own.for_each_data([&](IVec3, VoxelType, const VoxelData& data) { EXPECT_NE(data.state, 0U); });
+    EXPECT_LE(own.data_count(), from.data_count());
+  }
+}
+
 TEST(CopyBox, RecordsExactlyTheChanges) {
   RandomBoxes random(11);
   Grid grid = random.grid();

@@ -285,12 +285,12 @@ TextureLayer TextureSet::add(const Texture& texture) {
 }
 
 void TextureSet::add(const VoxelRegistry& types) {
-  if (!types.has_textures()) return;
+  if (!types.has_textures() && !types.has_shapes()) return;
   for (std::size_t type = 1; type < types.size(); ++type) {
-    const VoxelFaces& faces = types[static_cast<VoxelType>(type)].faces;
-    for (const Direction direction : kDirections) {
-      if (!faces.empty()) add(faces[direction].texture);
-    }
+    const VoxelProperties& properties = types[static_cast<VoxelType>(type)];
+    for_each_look(properties, [&](const VoxelFace& look) {
+      if (!look.texture.is_null()) add(look.texture);
+    });
   }
 }
 

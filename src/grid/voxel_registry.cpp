@@ -57,6 +57,8 @@ bool settle(VoxelProperties& p) {
   bool has_changed = false;
   for (std::optional<bool>* property : {&p.blocks_light, &p.occludes}) {
     if (*property != (visibility_of(p) == Visibility::Opaque)) continue;
+    // Shapes let light through in some directions, which no value says.
+    if (property == &p.blocks_light && !p.shapes.empty()) continue;
     property->reset();
     has_changed = true;
   }
@@ -186,6 +188,20 @@ void VoxelRegistry::Content::release_textures(const VoxelFaces& faces) noexcept 
 }
 
 struct VoxelRegistry::Journal : ChangeJournal<TypeRecord> {};
+
+void for_each_look(const VoxelProperties& type, FunctionRef<void(const VoxelFace& look)> visit) {
+  for (const Direction direction : kDirections) {
+    if (!type.faces.empty()) visit(type.faces[direction]);
+  }
+  if (type.shapes.empty()) return;
+  for (const ShapePart& part : type.shapes.rules().parts) {
+    for (const ShapeElement& element : part.shape.elements()) {
+      for (const ElementFace& face : element.faces) {
+        if (face.face) visit(*face.face);
+      }
+    }
+  }
+}
 
 Status validate_type(const VoxelProperties& properties) {
   const auto wrong = [&](const char* property, const char* reason) {

@@ -17,8 +17,12 @@ struct CopyOptions {
   /// kept.
   /// Lifetime: must outlive the call.
   std::span<const VoxelType> type_map{};
-  /// Maps the state (VoxelData) of a copied voxel, for voxels that have a state. Only the game knows how a state
-  /// encodes a direction, so a rotated copy needs this function. If empty, states are copied unchanged.
+  /// The types of `to`. A rotated or mirrored copy turns the states of types with orientations by
+  /// StateOrientations::turned, also of voxels whose state is 0. Null: states are copied unchanged.
+  /// Lifetime: must outlive the call.
+  const VoxelRegistry* types = nullptr;
+  /// Maps the state (VoxelData) of a copied voxel, for voxels that have a state, instead of `types`: for states that
+  /// encode a direction in a way that only the game knows.
   std::function<std::uint32_t(VoxelType type, std::uint32_t state)> map_state{};
 };
 
@@ -34,7 +38,8 @@ struct CopyOptions {
 /// Limits:   voxels that would land outside the world (see Grid) are left out. An empty box copies nothing.
 /// Cost:     O(chunks of the box) for a move by whole chunks without rotation. These chunks are shared with `from`
 ///           until edited; so are uniform chunks in every case. Otherwise O(rows of 64 voxels in the box), rotated or
-///           not, and 0.5 MiB of memory for the call. Chunks that do not exist in either grid cost nothing.
+///           not, and 0.5 MiB of memory for the call. Chunks that do not exist in either grid cost nothing. A voxel
+///           whose state turns costs as `set_data`.
 std::int64_t copy_box(const Grid& from, const IBox& box, Grid& to, IVec3 to_min, AxisOrientation orientation = {},
                       const CopyOptions& options = {});
 

@@ -219,7 +219,8 @@ class TextureSet {
   /// Adds a texture and returns its layer, or returns the layer of an equal one. Layers never move. Errors: bad_alloc;
   /// the set is then unchanged. Cost: O(log layers). Requires: not null.
   TextureLayer add(const Texture& texture);
-  /// Adds the textures of all types, in the order of the types and of kDirections. Cost: O(types).
+  /// Adds the textures of all types, in the order of the types: of their faces, in the order of kDirections, then of
+  /// their shapes, in the order of parts and elements. Cost: O(types and elements).
   void add(const VoxelRegistry& types);
 
   /// Returns the layer of an equal texture, or nullopt.

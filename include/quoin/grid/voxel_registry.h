@@ -11,6 +11,7 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
+#include <quoin/core/function_ref.h>
 #include <quoin/core/ref.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
@@ -81,8 +82,9 @@ struct VoxelProperties {
   // path tracing follow `visibility`.
 
   /// True if propagated light does not leave a voxel of this type: a lamp's own light does, which spreads from any
-  /// type. Light enters a transparent type that blocks light, so that faces behind it are lit, and a room below stays
-  /// dark: a roof of stairs. It enters no opaque one. Default: true for opaque types.
+  /// type. Light enters a transparent type that blocks light, or one with shapes, so that faces behind it are lit, and
+  /// a room below stays dark: a roof of stairs. It enters no opaque one. Default: true for opaque types without shapes.
+  /// Opaque types with shapes then stop light at the sides that a shape covers wholly (ShapeModel::covers_side).
   std::optional<bool> blocks_light{};
   /// True if voxels of this type darken the corners of faces next to them: in blocky meshes, `face_occlusion`,
   /// impostors and images with OcclusionMode::Vertex. Requires an opaque type: merging faces without loss needs
@@ -108,6 +110,10 @@ struct VoxelProperties {
 
   bool operator==(const VoxelProperties&) const = default;
 };
+
+/// Calls `visit` for each face of a type (`faces`, in the order of kDirections) and each face of its shapes that has a
+/// look of its own, in the order of parts, elements and kDirections. Equal textures occur several times.
+void for_each_look(const VoxelProperties& type, FunctionRef<void(const VoxelFace& look)> visit);
 
 /// Returns an error if a registry does not accept a type's properties. The message names the type and the property.
 ///
