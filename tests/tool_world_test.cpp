@@ -50,7 +50,7 @@ TEST_F(ToolWorld, OtherCommandsReadAndWriteWorlds) {
 TEST_F(ToolWorld, InfoDescribesWorld) {
   const ToolRun text = run("world info hills.quoin");
   EXPECT_EQ(text.status, 0) << text.err;
-  EXPECT_NE(text.out.find(": world version 5"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find(": world version 6"), std::string::npos) << text.out;
   const Json json = Json::parse(run("world info hills.quoin --json").out);
   EXPECT_EQ(json["bytes"], std::filesystem::file_size(folder_.file("hills.quoin")));
   EXPECT_EQ(json["grids"].size(), 1U);

@@ -52,9 +52,12 @@ class Losses {
   /// Counts a grid of the file. Requires: its types are registered in the scene.
   void count(const PlacedGrid& grid, bool is_turned) {
     ++placed_;
-    const std::int64_t states = grid.voxels.data_count();
-    states_ += states;
-    if (is_turned) turned_states += states;
+    states_ += grid.voxels.data_count();
+    if (is_turned && grid.voxels.data_count() != 0) {
+      grid.voxels.for_each_data([&](IVec3, VoxelType type, const VoxelData&) {
+        turned_states += scene_.types.is_turned_by_state(type) ? 0 : 1;
+      });
+    }
     for (const VoxelType type : grid.voxels.types()) {
       QUOIN_ASSERT(type < used_.size(), "a registered type");
       used_[type] = true;
@@ -203,7 +206,9 @@ class Placer {
     placed.visible = visible;
     const IVec3 min(nearest);
     placed.box = {min, min + size};
-    copy_box(grid.grid, box, placed.voxels, min, *orientation);
+    CopyOptions turned;
+    turned.types = &scene_.types;
+    copy_box(grid.grid, box, placed.voxels, min, *orientation, turned);
     if (auto known = check_types(placed.voxels, scene_.types, text_of(instance, grid)); !known) return known;
     if (!placed.name.empty()) ++losses_.nameless;
     losses_.count(placed, *orientation != AxisOrientation());

@@ -164,6 +164,24 @@ std::vector<double> unit(std::vector<double> v, const Place& place, Faults& faul
   return v;
 }
 
+std::size_t small_number(const Object& object, std::string_view key, std::size_t most, std::size_t usual) {
+  const Json* number = object.find(key);
+  if (number == nullptr) return usual;
+  if (number->is_number_unsigned() && *number <= most) return number->get<std::size_t>();
+  object.faults().add(object.place_of(key), "must be a whole number from 0 to " + std::to_string(most));
+  return usual;
+}
+
+std::optional<std::uint32_t> bits_in(const Object& object, std::string_view key) {
+  const Json* json = object.find(key);
+  if (json == nullptr) return std::nullopt;
+  if (json->is_number_unsigned() && json->get<std::uint64_t>() <= std::numeric_limits<std::uint32_t>::max()) {
+    return json->get<std::uint32_t>();
+  }
+  object.faults().add(object.place_of(key), "must be a whole number from 0 to 4294967295");
+  return std::nullopt;
+}
+
 const Json* find_list(const Object& object, std::string_view key, std::size_t most) {
   const Json* list = object.need(key);
   if (list == nullptr) return nullptr;

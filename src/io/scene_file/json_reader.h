@@ -1,14 +1,18 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <initializer_list>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
+#include <quoin/core/assert.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 
@@ -77,6 +81,40 @@ class Object {
 
 /// Normalises a vector unless it is unit up to rounding; reports a fault if it is all 0.
 [[nodiscard]] std::vector<double> unit(std::vector<double> v, const Place& place, Faults& faults);
+
+/// Reads a whole number from 0 to `most`; missing: returns `usual`.
+[[nodiscard]] std::size_t small_number(const Object& object, std::string_view key, std::size_t most, std::size_t usual);
+
+/// Reads a number of 32 bits; missing: returns nullopt.
+[[nodiscard]] std::optional<std::uint32_t> bits_in(const Object& object, std::string_view key);
+
+/// Returns the name of a value. Requires: it has one.
+template <class T, std::size_t kCount>
+const char* name_of(const std::array<std::pair<const char*, T>, kCount>& names, T value) {
+  const char* found = nullptr;
+  for (const auto& [name, each] : names) {
+    if (each == value) found = name;
+  }
+  QUOIN_ASSERT(found != nullptr, "a value with a name");
+  return found;
+}
+
+/// Reads the name of a value; missing: keeps `out`.
+template <class T, std::size_t kCount>
+void read_name(const Object& object, std::string_view key, const std::array<std::pair<const char*, T>, kCount>& names,
+               T& out) {
+  std::string name = name_of(names, out);
+  object.read(key, name);
+  std::string all;
+  for (const auto& [each, value] : names) {
+    if (name == each) {
+      out = value;
+      return;
+    }
+    all += (all.empty() ? "" : ", ") + std::string(each);
+  }
+  object.faults().add(object.place_of(key), "must be one of " + all);
+}
 
 /// Returns the list of that key, with at most so many entries; null if there is none.
 [[nodiscard]] const Json* find_list(const Object& object, std::string_view key, std::size_t most);

@@ -402,7 +402,8 @@ TEST(SceneData, RefusesInvalidReferencesToTextures) {
   EXPECT_EQ(error_of(R"({"type":0,"texture":0})"), place + ".type: type 0 does not come before this type");
   EXPECT_EQ(error_of(R"({"type":1,"texture":0})"), place + ".texture: type 1 has no texture 0 in its list");
   EXPECT_EQ(error_of(R"({"type":2,"texture":1})"), place + ".texture: type 2 has no texture 1 in its list");
-  EXPECT_EQ(error_of(R"({"type":2,"texture":6})"), place + ".texture: must be a whole number from 0 to 5");
+  EXPECT_EQ(error_of(R"({"type":2,"texture":6})"), place + ".texture: type 2 has no texture 6 in its list");
+  EXPECT_EQ(error_of(R"({"type":2,"texture":9999})"), place + ".texture: must be a whole number from 0 to 3077");
   EXPECT_EQ(error_of(R"({"type":-1,"texture":0})"), place + ".type: must be a whole number from 0 to 65535");
   EXPECT_EQ(error_of(R"({"type":1e99,"texture":0})"), place + ".type: must be a whole number from 0 to 65535");
   EXPECT_EQ(error_of(R"({"type":[2],"texture":0})"), place + ".type: must be a whole number from 0 to 65535");
@@ -469,6 +470,119 @@ TEST(SceneData, RefusesInvalidTexturesWithTheirPosition) {
             faces +
                 ": cannot use voxel type \"window\": faces: the face +Z is opaque, but its texture \"pane \xff\" has "
                 "transparent texels");
+}
+
+// A pane with all that shapes can have, also textures that its faces do not have.
+VoxelProperties shaped_type() {
+  VoxelProperties type = textured_type();
+  type.name = "pane";
+  type.state_bits = 5;
+  type.orientations = StateOrientations::to_directions(2);
+  const Texture knob = random_texture("knob", 16, 7, false);
+  ShapeElement tilted{.min = Vec3(-15.5F, 0.1F, 3.0F), .max = Vec3(32.0F, 1.0F / 3.0F, 3.0F), .collides = false};
+  tilted.turn = ElementTurn{.origin = Vec3(1.0F, 2.5F, -3.0F), .axis = 2, .degrees = 22.5F, .rescales = true};
+  tilted.faces[0].is_drawn = false;
+  tilted.faces[1].face = VoxelFace{.texture = knob, .turn = 2, .tint = {9, 8, 7, 255}};
+  tilted.faces[1].part = {16.0F, 0.5F, 0.0F, 1e-3F};
+  tilted.faces[3].face = type.faces[Direction::NegY];
+  tilted.faces[4].face = VoxelFace{.tint = {1, 2, 3, 255}, .alpha = FaceAlpha::Translucent};
+  ShapePart bar{.shape = *VoxelShape::from_elements({ShapeElement{}, tilted}), .orientation = AxisOrientation::at(29)};
+  bar.when = {{.state_mask = 3, .state = 2, .connected = {Direction::NegX, Direction::PosZ}},
+              {.unconnected = {Direction::PosY}, .corner = StairCorner::InnerLeft}};
+  type.shapes = *VoxelShapes::from_rules({.parts = {{.shape = VoxelShape::box({1, 2, 3}, {4, 5, 6})}, bar},
+                                          .neighbours = ShapeNeighbours::Connected,
+                                          .groups = 0xF000'0001U,
+                                          .connects_to_full_sides = false});
+  return type;
+}
+
+TEST(SceneData, KeepsOrientationsAndShapes) {
+  Scene scene = scene_of(Grid());
+  ASSERT_TRUE(scene.types.add(textured_type()));
+  ASSERT_TRUE(scene.types.add(shaped_type()));
+  ASSERT_TRUE(scene.types.add(
+      {.name = "log", .state_bits = 2, .blocks_light = false, .orientations = StateOrientations::along_axes()}));
+  ASSERT_TRUE(scene.types.add({.name = "water",
+                               .visibility = Visibility::Transparent,
+                               .state_bits = 4,
+                               .shapes = *VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid})}));
+  ASSERT_TRUE(scene.types.add({.name = "slab", .blocks_light = false, .shapes = VoxelShape::crossed_plates(12)}));
+  const std::string text = text_of(scene);
+  EXPECT_NE(text.find("\"quoin_scene\": 9"), std::string::npos);
+  std::size_t textures = 0;
+  for (std::size_t at = 0; (at = text.find("\"texels\"", at)) != std::string::npos; ++at) ++textures;
+  EXPECT_EQ(textures, 3U) << "each texture once";
+  const auto loaded = read(text);
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  ASSERT_EQ(loaded->scene.types.size(), scene.types.size());
+  for (VoxelType type = 1; type < scene.types.size(); ++type) {
+    EXPECT_EQ(loaded->scene.types[type], scene.types[type]) << scene.types[type].name;
+  }
+  EXPECT_EQ(text_of(loaded->scene), text);
+  TextureSet layers;
+  layers.add(loaded->scene.types);
+  EXPECT_TRUE(layers.find(random_texture("knob", 16, 7, false)));
+  const TestFolder folder("scene_shapes");
+  for (const char* name : {"a.json", "a.quoin"}) {
+    const auto saved = save_scene(scene, folder.file(name));
+    ASSERT_TRUE(saved) << to_string(saved.error());
+    const auto again = load_scene(folder.file(name));
+    ASSERT_TRUE(again) << to_string(again.error());
+    ASSERT_EQ(again->scene.types.size(), scene.types.size());
+    for (VoxelType type = 1; type < scene.types.size(); ++type) {
+      EXPECT_EQ(again->scene.types[type], scene.types[type]) << name << " " << scene.types[type].name;
+    }
+  }
+}
+
+TEST(SceneData, RefusesInvalidShapesWithTheirPosition) {
+  Scene scene;
+  ASSERT_TRUE(scene.types.add(shaped_type()));
+  const std::string text = text_of(scene);
+  const auto error_with = [&](const std::string& wanted, const std::string& instead) {
+    std::string other = text;
+    const std::size_t at = other.find(wanted);
+    EXPECT_NE(at, std::string::npos) << wanted;
+    if (at != std::string::npos) other.replace(at, wanted.size(), instead);
+    const auto loaded = read(other);
+    return loaded ? "" : loaded.error().message;
+  };
+  const std::string shapes = "types[0].shapes";
+  const std::string element = shapes + ".parts[1].elements[1]";
+  EXPECT_EQ(error_with("\"name\"", "\"name\""), "");
+  EXPECT_EQ(error_with("\"connected\",", "\"beside\","),
+            shapes + ".neighbours: must be one of none, connected, stairs, fluid");
+  EXPECT_EQ(error_with("\"groups\":4026531841", "\"groups\":-1"),
+            shapes + ".groups: must be a whole number from 0 to 4294967295");
+  EXPECT_EQ(error_with("\"orientation\":29", "\"orientation\":48"),
+            shapes + ".parts[1].orientation: must be a whole number from 0 to 47");
+  EXPECT_EQ(error_with("\"+Z\"", "\"up\""),
+            shapes + ".parts[1].when[0].connected[1]: must be one of +X, -X, +Y, -Y, +Z, -Z");
+  EXPECT_EQ(
+      error_with("\"inner_left\"", "\"left\""),
+      shapes + ".parts[1].when[1].corner: must be one of straight, outer_left, outer_right, inner_left, inner_right");
+  EXPECT_EQ(error_with("\"degrees\":22.5", "\"degrees\":1e300"),
+            shapes + ".parts[1].elements: cannot use element 1 of a shape: the turn is not finite");
+  EXPECT_EQ(error_with("\"axis\":2", "\"axis\":3"), element + ".turn.axis: must be a whole number from 0 to 2");
+  EXPECT_EQ(error_with("[-15.5,", "[-17,"), shapes +
+                                                ".parts[1].elements: cannot use element 1 of a shape: a corner is "
+                                                "outside -16 to 32 sixteenths");
+  EXPECT_EQ(error_with("{\"drawn\":false},", ""), element + ".faces: must be a list of 6 faces");
+  EXPECT_EQ(error_with("\"texture\":2,\"turn\":2", "\"texture\":3,\"turn\":2"),
+            element + ".faces[1].face.texture: must be an index into textures, from 0");
+  EXPECT_EQ(error_with("\"elements\"", "\"boxes\""), shapes + ".parts[0]: \"boxes\" is unknown here");
+  EXPECT_EQ(error_with("\"by_value\":[", "\"by_value\":[99,"),
+            "types[0].orientations.by_value[0]: must be the number of an orientation, 0 to 47");
+  EXPECT_EQ(error_with("\"state_bits\":5", "\"state_bits\":2"),
+            shapes +
+                ": cannot use voxel type \"pane\": orientations: they use bits of the state that `state_bits` does "
+                "not declare");
+  std::string many = "[";
+  for (int i = 0; i < 200; ++i) many += i == 0 ? "{}" : ",{}";
+  EXPECT_EQ(error_with("\"elements\":[", "\"elements\":" + many + "],\"rest\":["),
+            shapes + ".parts[0]: \"rest\" is unknown here");
+  EXPECT_EQ(error_with("\"elements\":[{", "\"elements\":" + many + ",{"),
+            shapes + ".parts[0].elements: has more than 128 entries");
 }
 
 TEST(SceneData, RejectsMoreThan32StateBits) {

@@ -38,6 +38,7 @@ class SceneText {
         is_seventh_ |=
             properties.blocks_light || properties.occludes || properties.light_cost != 0 || properties.remesh_on_data;
         is_eighth_ |= !properties.faces.empty();
+        is_ninth_ |= !properties.orientations.empty() || !properties.shapes.empty();
       }
       for (std::size_t i = 0; i < scene.grids.size(); ++i) {
         put_grid(scene.grids[i], pieces.voxels[i], pieces.densities[i], pieces.data[i]);
@@ -84,7 +85,8 @@ class SceneText {
     const bool has_models = !types_.empty() || !grids_.empty();
     const bool is_fourth = !layers_.empty() || !groups_.empty();
     std::string text = "{\n  \"quoin_scene\": ";
-    text += is_eighth_                                               ? "8"
+    text += is_ninth_                                                ? "9"
+            : is_eighth_                                             ? "8"
             : is_seventh_                                            ? "7"
             : is_sixth_                                              ? "6"
             : is_fifth_                                              ? "5"
@@ -126,6 +128,7 @@ class SceneText {
   bool is_sixth_ = false;
   bool is_seventh_ = false;
   bool is_eighth_ = false;
+  bool is_ninth_ = false;
 };
 
 Status check_types(const SceneFile& scene) {

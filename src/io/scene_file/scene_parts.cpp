@@ -25,10 +25,6 @@ bool is_same(double a, double b) {
 
 namespace {
 
-OrderedJson triple(DVec3 v) {
-  return {v.x, v.y, v.z};
-}
-
 bool is_same(DVec3 a, DVec3 b) {
   return scene_json::is_same(a.x, b.x) && scene_json::is_same(a.y, b.y) && scene_json::is_same(a.z, b.z);
 }
@@ -83,17 +79,6 @@ std::optional<std::size_t> place_in(const Object& object, std::string_view key, 
   return 0;
 }
 
-// Reads a number of 32 bits.
-std::optional<std::uint32_t> bits_in(const Object& object, std::string_view key) {
-  const Json* json = object.find(key);
-  if (json == nullptr) return std::nullopt;
-  if (json->is_number_unsigned() && json->get<std::uint64_t>() <= std::numeric_limits<std::uint32_t>::max()) {
-    return json->get<std::uint32_t>();
-  }
-  object.faults().add(object.place_of(key), "must be a whole number from 0 to 4294967295");
-  return std::nullopt;
-}
-
 /// Returns true if the axes are unit, perpendicular and right-handed, up to rounding.
 bool is_frame(const Camera& camera) {
   constexpr double kRounding = 1e-6;
@@ -125,19 +110,6 @@ Camera kept_camera(const Json& json, const Place& place, Faults& faults) {
   return camera;
 }
 
-/// Reads a list "attributes" of pairs.
-void read_attributes(const Object& object, std::map<std::string, std::string>& attributes) {
-  read_list(object, "attributes", std::numeric_limits<std::size_t>::max(), [&](const Json& pair, const Place& place) {
-    if (!pair.is_array() || pair.size() != 2) {
-      object.faults().add(place, "must be a key and a value");
-      return;
-    }
-    std::string key = object.text(pair[0], {&place, {}, 0});
-    const bool is_new = attributes.emplace(std::move(key), object.text(pair[1], {&place, {}, 1})).second;
-    if (!is_new) object.faults().add(place, "is a duplicate key");
-  });
-}
-
 // ---- environments ------------------------------------------------------------------------------------------------
 
 constexpr std::array<std::pair<const char*, SkyModel>, 5> kSkies = {{{"fixed", SkyModel::Fixed},
@@ -147,39 +119,6 @@ constexpr std::array<std::pair<const char*, SkyModel>, 5> kSkies = {{{"fixed", S
                                                                      {"image", SkyModel::Image}}};
 constexpr std::array<std::pair<const char*, ToneCurve>, 4> kTones = {
     {{"clamp", ToneCurve::Clamp}, {"neutral", ToneCurve::Neutral}, {"agx", ToneCurve::Agx}, {"aces", ToneCurve::Aces}}};
-
-constexpr std::array<std::pair<const char*, FaceAlpha>, 3> kFaceAlphas = {
-    {{"opaque", FaceAlpha::Opaque}, {"cutout", FaceAlpha::Cutout}, {"translucent", FaceAlpha::Translucent}}};
-
-template <class T, std::size_t kCount>
-const char* name_of(const std::array<std::pair<const char*, T>, kCount>& names, T value) {
-  const char* found = nullptr;
-  for (const auto& [name, each] : names) {
-    if (each == value) found = name;
-  }
-  QUOIN_ASSERT(found != nullptr, "a value with a name");
-  return found;
-}
-
-template <class T, std::size_t kCount>
-void read_name(const Object& object, std::string_view key, const std::array<std::pair<const char*, T>, kCount>& names,
-               T& out) {
-  std::string name = name_of(names, out);
-  object.read(key, name);
-  std::string all;
-  for (const auto& [each, value] : names) {
-    if (name == each) {
-      out = value;
-      return;
-    }
-    all += (all.empty() ? "" : ", ") + std::string(each);
-  }
-  object.faults().add(object.place_of(key), "must be one of " + all);
-}
-
-OrderedJson triple(Vec3 v) {
-  return {v.x, v.y, v.z};
-}
 
 // ---- writing settings
 
@@ -318,76 +257,6 @@ void read_settings(const Json& json, const Place& place, Faults& faults, Part& p
 
 }  // namespace
 
-OrderedJson PartWriter::text(const std::string& bytes) {
-  if (is_utf8(bytes)) return bytes;
-  needs_second_ = true;
-  return {{"base64", to_base64(std::as_bytes(std::span(bytes)))}};
-}
-
-OrderedJson PartWriter::json_of(const Texture& texture, std::size_t index) {
-  const auto [first, last] = written_.equal_range(texture.hash());
-  const auto same = std::find_if(first, last, [&](const auto& each) { return each.second.texture == texture; });
-  if (same != last) return {{"type", same->second.type}, {"texture", same->second.index}};
-  written_.emplace(texture.hash(), WrittenTexture{texture, types_, index});
-  const std::size_t channels = texture.is_opaque() ? 3 : 4;
-  std::vector<std::byte> bytes;
-  bytes.reserve(channels * texture.level(0).size());
-  for (const Rgba8 texel : texture.level(0)) {
-    const std::array<std::uint8_t, 4> values = {texel.r, texel.g, texel.b, texel.a};
-    for (std::size_t i = 0; i < channels; ++i) bytes.push_back(std::byte{values[i]});
-  }
-  return {{"name", text(texture.name())}, {"size", texture.size()}, {"texels", to_base64(bytes)}};
-}
-
-OrderedJson PartWriter::json_of(const VoxelFaces& faces) {
-  QUOIN_ASSERT(!faces.empty(), "textured faces");
-  OrderedJson json = OrderedJson::object();
-  std::vector<Texture> textures;
-  for (const Direction direction : kDirections) {
-    const VoxelFace& face = faces[direction];
-    auto known = std::ranges::find(textures, face.texture);
-    if (known == textures.end()) {
-      json["textures"].push_back(json_of(face.texture, textures.size()));
-      known = textures.insert(textures.end(), face.texture);
-    }
-    OrderedJson each = {{"texture", known - textures.begin()}};
-    if (face.turn != 0) each["turn"] = face.turn;
-    if (face.mirrored) each["mirrored"] = true;
-    const Rgba8 tint = face.tint;
-    if (!(tint == VoxelFace{}.tint)) each["tint"] = {tint.r, tint.g, tint.b, tint.a};
-    if (face.alpha != FaceAlpha::Opaque) each["alpha"] = name_of(kFaceAlphas, face.alpha);
-    json["sides"].push_back(std::move(each));
-  }
-  return json;
-}
-
-OrderedJson PartWriter::json_of(const VoxelProperties& type) {
-  ++types_;
-  const VoxelProperties plain;
-  OrderedJson json = OrderedJson::object();
-  if (!type.name.empty()) json["name"] = text(type.name);
-  json["colour"] = {type.colour.r, type.colour.g, type.colour.b, type.colour.a};
-  if (type.visibility == Visibility::Transparent) json["visibility"] = "transparent";
-  if (!type.collides) json["collides"] = false;
-  const auto put = [&](const char* key, float value, float usual) {
-    if (!is_same(value, usual)) json[key] = value;
-  };
-  put("roughness", type.roughness, plain.roughness);
-  put("metalness", type.metalness, plain.metalness);
-  put("emission", type.emission, plain.emission);
-  put("ior", type.ior, plain.ior);
-  put("scattering", type.scattering, plain.scattering);
-  put("anisotropy", type.anisotropy, plain.anisotropy);
-  if (type.state_bits != 0) json["state_bits"] = type.state_bits;
-  if (type.blocks_light) json["blocks_light"] = *type.blocks_light;
-  if (type.occludes) json["occludes"] = *type.occludes;
-  if (type.light_cost != 0) json["light_cost"] = type.light_cost;
-  if (type.remesh_on_data) json["remesh_on_data"] = true;
-  if (!type.faces.empty()) json["faces"] = json_of(type.faces);
-  for (const auto& [key, value] : type.attributes) json["attributes"].push_back({text(key), text(value)});
-  return json;
-}
-
 OrderedJson PartWriter::json_of(const SceneGrid& grid) {
   OrderedJson json = OrderedJson::object();
   if (!grid.name.empty()) json["name"] = text(grid.name);
@@ -477,157 +346,6 @@ OrderedJson PartWriter::json_of(const Camera& camera) {
 OrderedJson PartWriter::json_of(const Environment& environment) {
   const SettingsWriter writer([this](const std::string& bytes) { return text(bytes); });
   return writer.json_of(environment, Environment::natural());
-}
-
-namespace {
-
-// Reads a whole number from 0 to `most`.
-std::size_t small_number(const Object& object, std::string_view key, std::size_t most, std::size_t usual) {
-  const Json* number = object.find(key);
-  if (number == nullptr) return usual;
-  if (number->is_number_unsigned() && *number <= most) return number->get<std::size_t>();
-  object.faults().add(object.place_of(key), "must be a whole number from 0 to " + std::to_string(most));
-  return usual;
-}
-
-// Reads a texture that an earlier type has.
-Texture shared_texture(const Json& json, const Place& place, const TexturesOfTypes& earlier, Faults& faults) {
-  const Object object(json, place, {"type", "texture"}, faults);
-  constexpr std::size_t kMostTextures = 6;
-  const std::size_t type = small_number(object, "type", kMaxVoxelTypes, 0);
-  const std::size_t texture = small_number(object, "texture", kMostTextures - 1, 0);
-  if (object.need("texture") == nullptr || faults.error()) return {};
-  if (type == 0 || type > earlier.size()) {
-    faults.add(object.place_of("type"), "type " + std::to_string(type) + " does not come before this type");
-    return {};
-  }
-  if (const std::vector<Texture>& of_type = earlier[type - 1]; texture < of_type.size()) return of_type[texture];
-  faults.add(object.place_of("texture"),
-             "type " + std::to_string(type) + " has no texture " + std::to_string(texture) + " in its list");
-  return {};
-}
-
-Texture texture_of(const Json& json, const Place& place, const TexturesOfTypes& earlier, Faults& faults) {
-  if (json.is_object() && json.contains("type")) return shared_texture(json, place, earlier, faults);
-  const Object object(json, place, {"name", "size", "texels"}, faults);
-  std::string name;
-  object.read_text("name", name);
-  const auto size = static_cast<int>(small_number(object, "size", kMaxTextureSize, 0));
-  const Json* texels = object.need("texels");
-  if (texels == nullptr || object.need("size") == nullptr || faults.error()) return {};
-  const auto bytes = from_base64(object.text(*texels, object.place_of("texels")));
-  if (!bytes) {
-    faults.add(object.place_of("texels"), bytes.error().message);
-    return {};
-  }
-  const std::size_t count = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
-  const std::size_t channels = bytes->size() == 3 * count ? 3 : 4;
-  const bool is_complete = bytes->size() == channels * count;
-  AlphaImage image{size, size, std::vector<std::uint8_t>(4 * count, 255)};
-  for (std::size_t i = 0; is_complete && i < image.rgba.size(); ++i) {
-    if (i % 4 < channels) image.rgba[i] = std::to_integer<std::uint8_t>((*bytes)[i / 4 * channels + i % 4]);
-  }
-  auto texture = Texture::from_image(std::move(name), image);
-  if (!texture) {
-    faults.add(place, texture.error().message);
-  } else if (!is_complete) {
-    const std::string side = std::to_string(size);
-    faults.add(object.place_of("texels"), "must have 3 or 4 bytes for each of the " + side + " x " + side +
-                                              " texels, not " + std::to_string(bytes->size()) + " bytes");
-  }
-  return texture ? *texture : Texture();
-}
-
-VoxelFace face_of(const Json& json, const Place& place, const std::vector<Texture>& textures, Faults& faults) {
-  const Object object(json, place, {"texture", "turn", "mirrored", "tint", "alpha"}, faults);
-  VoxelFace face;
-  const std::size_t texture = small_number(object, "texture", 5, 0);
-  if (texture < textures.size()) {
-    face.texture = textures[texture];
-  } else {
-    faults.add(object.place_of("texture"), "must be an index into textures, from 0");
-  }
-  face.turn = static_cast<std::uint8_t>(small_number(object, "turn", 3, 0));
-  object.read("mirrored", face.mirrored);
-  if (const Json* tint = object.find("tint")) {
-    const std::vector<int> c = object.whole_numbers(*tint, object.place_of("tint"), 4, 0, 255);
-    const auto channel = [&](std::size_t i) { return static_cast<std::uint8_t>(c[i]); };
-    face.tint = {channel(0), channel(1), channel(2), channel(3)};
-  }
-  read_name(object, "alpha", kFaceAlphas, face.alpha);
-  return face;
-}
-
-// Reads the faces of the next type.
-VoxelFaces faces_of(const Json& json, const Place& place, TexturesOfTypes& earlier, Faults& faults) {
-  const Object object(json, place, {"textures", "sides"}, faults);
-  std::vector<Texture> textures;
-  read_list(object, "textures", 6,
-            [&](const Json& each, const Place& at) { textures.push_back(texture_of(each, at, earlier, faults)); });
-  std::array<VoxelFace, 6> sides;
-  std::size_t count = 0;
-  read_list(object, "sides", sides.size(),
-            [&](const Json& each, const Place& at) { sides[count++] = face_of(each, at, textures, faults); });
-  if (count != sides.size() && !faults.error()) faults.add(object.place_of("sides"), "must be a list of 6 faces");
-  earlier.push_back(std::move(textures));
-  return VoxelFaces(sides);
-}
-
-}  // namespace
-
-VoxelProperties properties_of(const Json& json, const Place& place, TexturesOfTypes& earlier, Faults& faults) {
-  const Object type(
-      json, place,
-      {"name", "colour", "visibility", "collides", "roughness", "metalness", "emission", "ior", "scattering",
-       "anisotropy", "state_bits", "blocks_light", "occludes", "light_cost", "remesh_on_data", "attributes", "faces"},
-      faults);
-  VoxelProperties properties;
-  type.read_text("name", properties.name);
-  if (const Json* colour = type.need("colour")) {
-    const std::vector<int> c = type.whole_numbers(*colour, type.place_of("colour"), 4, 0, 255);
-    const auto channel = [&](std::size_t i) { return static_cast<std::uint8_t>(c[i]); };
-    properties.colour = {channel(0), channel(1), channel(2), channel(3)};
-  }
-  std::string visibility = "opaque";
-  type.read("visibility", visibility);
-  if (visibility == "transparent") {
-    properties.visibility = Visibility::Transparent;
-  } else if (visibility != "opaque") {
-    faults.add(type.place_of("visibility"), "must be \"opaque\" or \"transparent\"");
-  }
-  type.read("collides", properties.collides);
-  type.read("roughness", properties.roughness);
-  type.read("metalness", properties.metalness);
-  type.read("emission", properties.emission);
-  type.read("ior", properties.ior);
-  type.read("scattering", properties.scattering);
-  type.read("anisotropy", properties.anisotropy);
-  properties.state_bits = static_cast<std::uint8_t>(small_number(type, "state_bits", kMaxStateBits, 0));
-  properties.light_cost = static_cast<std::uint8_t>(small_number(type, "light_cost", kMaxLightCost, 0));
-  const auto read_own = [&](const char* key, std::optional<bool>& out) {
-    if (type.find(key) == nullptr) return;
-    out = false;
-    type.read(key, *out);
-  };
-  read_own("blocks_light", properties.blocks_light);
-  read_own("occludes", properties.occludes);
-  if (properties.visibility == Visibility::Transparent && properties.occludes.value_or(false)) {
-    faults.add(type.place_of("occludes"), "must be false for a transparent type");
-  }
-  type.read("remesh_on_data", properties.remesh_on_data);
-  if (type.find("attributes") != nullptr) read_attributes(type, properties.attributes);
-  const Json* const faces = type.find("faces");
-  if (faces == nullptr) {
-    earlier.emplace_back();
-  } else {
-    properties.faces = faces_of(*faces, type.place_of("faces"), earlier, faults);
-    if (faults.error()) {
-      properties.faces = {};
-    } else if (const Status valid = validate_type(properties); !valid) {
-      faults.add(type.place_of("faces"), valid.error().message);
-    }
-  }
-  return properties;
 }
 
 SceneFile::Placement placement_of(const Json& json, const Place& place, Faults& faults) {

@@ -29,6 +29,14 @@ namespace quoin::scene_json {
 /// Keeps keys in insertion order.
 using OrderedJson = nlohmann::ordered_json;
 
+/// Returns a vector as a list of numbers.
+[[nodiscard]] inline OrderedJson triple(const DVec3& v) {
+  return {v.x, v.y, v.z};
+}
+[[nodiscard]] inline OrderedJson triple(const Vec3& v) {
+  return {v.x, v.y, v.z};
+}
+
 /// Returns true for equal bits: -0 differs from 0.
 [[nodiscard]] bool is_same(double a, double b);
 
@@ -56,7 +64,13 @@ class PartWriter {
     std::size_t index = 0;  // in the type's list
   };
 
-  [[nodiscard]] OrderedJson json_of(const VoxelFaces& faces);
+  // The textures of the type that is written: those of its faces, then those of its shapes.
+  using TypeTextures = std::vector<Texture>;
+
+  [[nodiscard]] OrderedJson json_of(const VoxelFaces& faces, TypeTextures& textures);
+  [[nodiscard]] OrderedJson json_of(const VoxelShapes& shapes, TypeTextures& textures);
+  [[nodiscard]] OrderedJson json_of(const ShapeElement& element, TypeTextures& textures, OrderedJson& list);
+  [[nodiscard]] OrderedJson json_of(const VoxelFace& face, TypeTextures& textures, OrderedJson& list);
   [[nodiscard]] OrderedJson json_of(const Texture& texture, std::size_t index);
   [[nodiscard]] OrderedJson text(const std::string& bytes);
 

@@ -48,11 +48,11 @@ void hash_text(XXH3_state_t& state, std::string_view text) {
 }  // namespace
 
 Status create_schema(Connection& database) {
-  static_assert(kWorldApplicationId == 0x51756F6E && kSchemaVersion == 5, "as in the statements");
+  static_assert(kWorldApplicationId == 0x51756F6E && kSchemaVersion == 6, "as in the statements");
   return database.run(
       "BEGIN;"
       "PRAGMA application_id=0x51756F6E;"
-      "PRAGMA user_version=5;"
+      "PRAGMA user_version=6;"
       "CREATE TABLE parts(kind TEXT NOT NULL, id NOT NULL, revision INTEGER NOT NULL, sum INTEGER NOT NULL,"
       " body BLOB NOT NULL);"
       "CREATE UNIQUE INDEX parts_by_id ON parts(kind, id);"

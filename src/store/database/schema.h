@@ -29,7 +29,7 @@
 
 namespace quoin::store {
 
-inline constexpr int kSchemaVersion = 5;
+inline constexpr int kSchemaVersion = 6;
 inline constexpr int kPageBytes = 8192;
 /// Chunks along a region's edge.
 inline constexpr int kRegionShift = 5;

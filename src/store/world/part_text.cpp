@@ -120,14 +120,13 @@ std::string text_of(const VoxelProperties& type) {
 std::uint64_t texture_bytes(const VoxelProperties& type) {
   std::uint64_t bytes = 0;
   std::vector<Texture> counted;
-  for (const Direction direction : kDirections) {
-    if (type.faces.empty()) break;
-    const Texture& texture = type.faces[direction].texture;
-    if (std::ranges::find(counted, texture) != counted.end()) continue;
+  for_each_look(type, [&](const VoxelFace& look) {
+    const Texture& texture = look.texture;
+    if (texture.is_null() || std::ranges::find(counted, texture) != counted.end()) return;
     counted.push_back(texture);
     const std::uint64_t channels = texture.is_opaque() ? 3 : 4;
     bytes += (channels * texture.level(0).size() + 2) / 3 * 4;  // base64
-  }
+  });
   return bytes;
 }
 

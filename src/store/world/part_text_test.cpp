@@ -93,6 +93,26 @@ TEST(PartText, CountsBytesOfTextures) {
   EXPECT_EQ(texture_bytes(VoxelProperties{}), 0U);
 }
 
+TEST(PartText, KeepsShapesAndCountsTheirTextures) {
+  const AlphaImage image{64, 64, std::vector<std::uint8_t>(std::size_t{4} * 64 * 64, 255)};
+  ShapeElement element{.max = Vec3(16.0F, 24.0F, 16.0F)};
+  for (ElementFace& face : element.faces) face.face = VoxelFace{.texture = Texture::from_image("t", image).value()};
+  const VoxelProperties tall{.name = "tall",
+                             .state_bits = 2,
+                             .orientations = StateOrientations::about_y(),
+                             .shapes = VoxelShape::from_elements({element}).value()};
+  const std::string text = text_of(tall);
+  const auto read = part_from<VoxelProperties>(std::as_bytes(std::span(text)), "type 1");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(*read, tall);
+  EXPECT_LE(texture_bytes(tall), text.size());
+  EXPECT_GT(texture_bytes(tall) + 1'000, text.size());
+  const std::string wrong = R"({"colour": [0, 0, 0, 255], "shapes": {"parts": []}})";
+  const Status refused = check_part({part::kType, std::int64_t{1}}, std::as_bytes(std::span(wrong)));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().message, "type 1.shapes: cannot use the shapes of a type: there is no part");
+}
+
 // A type's part must stay whole when another type changes.
 TEST(PartText, HasAllTexturesOfAType) {
   const AlphaImage image{16, 16, std::vector<std::uint8_t>(std::size_t{4} * 16 * 16, 255)};

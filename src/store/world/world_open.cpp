@@ -160,13 +160,14 @@ Status add_key_index(Connection& database) {
 
 // Version 3 has environment parts, which earlier programs would ignore. Version 4 has whole grids, and types with light
 // and occlusion of their own, which they would refuse as damaged. Without the mark a grid is streamed, as all were
-// before. Version 5 has types with textures.
+// before. Version 5 has types with textures, version 6 types with orientations and shapes.
 Status add_nothing(Connection& /*database*/) {
   return {};
 }
 
 constexpr std::array kSteps = {MigrationStep{1, false, add_key_index}, MigrationStep{2, false, add_nothing},
-                               MigrationStep{3, false, add_nothing}, MigrationStep{4, false, add_nothing}};
+                               MigrationStep{3, false, add_nothing}, MigrationStep{4, false, add_nothing},
+                               MigrationStep{5, false, add_nothing}};
 static_assert(kSteps.back().from + 1 == kSchemaVersion, "a step for each version");
 
 Status keep_copy(Connection& database, const std::filesystem::path& path) {
