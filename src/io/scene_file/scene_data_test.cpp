@@ -500,8 +500,11 @@ TEST(SceneData, KeepsOrientationsAndShapes) {
   Scene scene = scene_of(Grid());
   ASSERT_TRUE(scene.types.add(textured_type()));
   ASSERT_TRUE(scene.types.add(shaped_type()));
-  ASSERT_TRUE(scene.types.add(
-      {.name = "log", .state_bits = 2, .blocks_light = false, .orientations = StateOrientations::along_axes()}));
+  VoxelProperties log{.name = "log", .state_bits = 2, .blocks_light = false};
+  log.orientations = StateOrientations::along_axes();
+  log.orientations.front = Direction::NegZ;
+  log.field_textures = {.voxels = 2.5F, .flat_degrees = 20.0F, .steep_degrees = 41.0F};
+  ASSERT_TRUE(scene.types.add(log));
   ASSERT_TRUE(scene.types.add({.name = "water",
                                .visibility = Visibility::Transparent,
                                .state_bits = 4,

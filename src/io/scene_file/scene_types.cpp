@@ -73,10 +73,10 @@ OrderedJson PartWriter::json_of(const VoxelFace& face, TypeTextures& textures, O
 
 OrderedJson PartWriter::json_of(const VoxelFaces& faces, TypeTextures& textures) {
   QUOIN_ASSERT(!faces.empty(), "textured faces");
-  OrderedJson json = OrderedJson::object();
-  OrderedJson& list = json["textures"];
-  for (const Direction direction : kDirections) json["sides"].push_back(json_of(faces[direction], textures, list));
-  return json;
+  OrderedJson list = OrderedJson::array();
+  OrderedJson sides = OrderedJson::array();
+  for (const Direction direction : kDirections) sides.push_back(json_of(faces[direction], textures, list));
+  return {{"textures", std::move(list)}, {"sides", std::move(sides)}};
 }
 
 OrderedJson PartWriter::json_of(const ShapeElement& element, TypeTextures& textures, OrderedJson& list) {
@@ -119,6 +119,7 @@ OrderedJson json_of(const ShapeCondition& condition) {
 OrderedJson json_of(const StateOrientations& orientations) {
   OrderedJson json = OrderedJson::object();
   if (orientations.first_bit != 0) json["first_bit"] = orientations.first_bit;
+  if (orientations.front != StateOrientations{}.front) json["front"] = name_of(orientations.front);
   for (const AxisOrientation& orientation : orientations.by_value) json["by_value"].push_back(orientation.index());
   return json;
 }
@@ -169,6 +170,11 @@ OrderedJson PartWriter::json_of(const VoxelProperties& type) {
   if (type.remesh_on_data) json["remesh_on_data"] = true;
   TypeTextures textures;
   if (!type.faces.empty()) json["faces"] = json_of(type.faces, textures);
+  if (type.field_textures != plain.field_textures) {
+    json["field_textures"] = {{"voxels", type.field_textures.voxels},
+                              {"flat_degrees", type.field_textures.flat_degrees},
+                              {"steep_degrees", type.field_textures.steep_degrees}};
+  }
   if (!type.orientations.empty()) json["orientations"] = scene_json::json_of(type.orientations);
   if (!type.shapes.empty()) json["shapes"] = json_of(type.shapes, textures);
   for (const auto& [key, value] : type.attributes) json["attributes"].push_back({text(key), text(value)});
@@ -313,18 +319,21 @@ ShapeElement element_of(const Json& json, const Place& place, const std::vector<
   return element;
 }
 
+// Reads the name of a direction.
+Direction direction_of(const Json& json, const Place& place, Faults& faults) {
+  const auto found = std::ranges::find_if(
+      kDirections, [&](Direction direction) { return json.is_string() && json == name_of(direction); });
+  if (found != kDirections.end()) return *found;
+  faults.add(place, "must be one of +X, -X, +Y, -Y, +Z, -Z");
+  return Direction::PosX;
+}
+
 // Reads a list of names of directions.
 DirectionSet directions_of(const Object& object, std::string_view key) {
   DirectionSet directions;
   if (object.find(key) == nullptr) return directions;
   read_list(object, key, kDirections.size(), [&](const Json& each, const Place& place) {
-    const auto found = std::ranges::find_if(
-        kDirections, [&](Direction direction) { return each.is_string() && each == name_of(direction); });
-    if (found == kDirections.end()) {
-      object.faults().add(place, "must be one of +X, -X, +Y, -Y, +Z, -Z");
-    } else {
-      directions.insert(*found);
-    }
+    directions.insert(direction_of(each, place, object.faults()));
   });
   return directions;
 }
@@ -347,9 +356,12 @@ AxisOrientation orientation_of(std::size_t index) {
 }
 
 StateOrientations orientations_of(const Json& json, const Place& place, Faults& faults) {
-  const Object object(json, place, {"first_bit", "by_value"}, faults);
+  const Object object(json, place, {"first_bit", "front", "by_value"}, faults);
   StateOrientations orientations;
   orientations.first_bit = static_cast<std::uint8_t>(small_number(object, "first_bit", kMaxStateBits - 1, 0));
+  if (const Json* front = object.find("front")) {
+    orientations.front = direction_of(*front, object.place_of("front"), faults);
+  }
   read_list(object, "by_value", AxisOrientation::kCount, [&](const Json& each, const Place& at) {
     if (each.is_number_unsigned() && each < AxisOrientation::kCount) {
       orientations.by_value.push_back(orientation_of(each.get<std::size_t>()));
@@ -409,6 +421,13 @@ void read_looks(const Object& type, TexturesOfTypes& earlier, VoxelProperties& p
     last = "faces";
     properties.faces = faces_of(*faces, type.place_of("faces"), earlier, textures, faults);
   }
+  if (const Json* field = type.find("field_textures")) {
+    last = "field_textures";
+    const Object object(*field, type.place_of("field_textures"), {"voxels", "flat_degrees", "steep_degrees"}, faults);
+    object.read("voxels", properties.field_textures.voxels);
+    object.read("flat_degrees", properties.field_textures.flat_degrees);
+    object.read("steep_degrees", properties.field_textures.steep_degrees);
+  }
   if (const Json* orientations = type.find("orientations")) {
     last = "orientations";
     properties.orientations = orientations_of(*orientations, type.place_of("orientations"), faults);
@@ -420,6 +439,7 @@ void read_looks(const Object& type, TexturesOfTypes& earlier, VoxelProperties& p
   earlier.push_back(std::move(textures));
   if (faults.error()) {
     properties.faces = {};
+    properties.field_textures = {};
     properties.orientations = {};
     properties.shapes = {};
   } else if (const Status valid = validate_type(properties); last && !valid) {
@@ -444,9 +464,10 @@ void read_attributes(const Object& object, std::map<std::string, std::string>& a
 
 VoxelProperties properties_of(const Json& json, const Place& place, TexturesOfTypes& earlier, Faults& faults) {
   const Object type(json, place,
-                    {"name", "colour", "visibility", "collides", "roughness", "metalness", "emission", "ior",
-                     "scattering", "anisotropy", "state_bits", "blocks_light", "occludes", "light_cost",
-                     "remesh_on_data", "attributes", "faces", "orientations", "shapes"},
+                    {"name",         "colour",     "visibility",     "collides",   "roughness",  "metalness",
+                     "emission",     "ior",        "scattering",     "anisotropy", "state_bits", "blocks_light",
+                     "occludes",     "light_cost", "remesh_on_data", "attributes", "faces",      "field_textures",
+                     "orientations", "shapes"},
                     faults);
   VoxelProperties properties;
   type.read_text("name", properties.name);

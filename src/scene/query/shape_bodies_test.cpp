@@ -127,7 +127,7 @@ double distance_of(const DBox& box, DVec3 point) {
   return glm::length(point - glm::clamp(point, box.min, box.max));
 }
 
-// The fraction at which an axis-aligned box first overlaps a box; infinity if never.
+// Returns the fraction of the first overlap of a box along the axes with an obstacle; infinity if there is none.
 double first_overlap(const DBox& obstacle, DVec3 centre, DVec3 half, DVec3 displacement) {
   double enter = 0.0;
   double leave = 1.0;
@@ -169,7 +169,7 @@ TEST(ShapeBodies, OverlapAndSweepMeetTheBoxesOfShapesExactly) {
       const auto hit = sweep_box(tracer, body, displacement);
       ASSERT_EQ(hit.has_value(), first <= 1.0) << world << " " << i;
       if (!hit) continue;
-      ASSERT_NEAR(hit->fraction, first, 1e-8) << world << " " << i;
+      ASSERT_NEAR(hit->fraction, first, 1e-6) << world << " " << i;
       hits += first > 0.0 ? 1 : 0;
     }
   }
@@ -181,7 +181,7 @@ TEST(ShapeBodies, OverlapAndSweepMeetTheBoxesOfShapesExactly) {
 TEST(ShapeBodies, SweepsStopExactlyBeforeTheFirstOverlap) {
   Random random(9);
   int hits = 0;
-  for (int world = 0; world < cases(4, 30); ++world) {
+  for (int world = 0; world < cases(8, 30); ++world) {
     Instance placed;
     placed.rotation = random.rotation();
     placed.voxel_size = 1.0 + 0.4 * random.share();
@@ -189,8 +189,8 @@ TEST(ShapeBodies, SweepsStopExactlyBeforeTheFirstOverlap) {
     const ShapedWorld made(random_voxels(random, 60), placed);
     const SceneTracer tracer(made.scene);
     for (int i = 0; i < 60; ++i) {
-      const OrientedBox box{random.vector() * 10.0, glm::abs(random.vector()) + 0.1, random.rotation()};
-      const Capsule capsule{0.1 + std::abs(random.share()), random.vector() * 10.0, random.vector()};
+      const OrientedBox box{random.vector() * 8.0, glm::abs(random.vector()) + 0.1, random.rotation()};
+      const Capsule capsule{0.1 + std::abs(random.share()), random.vector() * 8.0, random.vector()};
       const DVec3 displacement = random.direction() * (i % 2 == 0 ? 25.0 : 3.0);
       const auto check = [&](const auto& body, const auto& hit) {
         const auto at = [&](double t) {
@@ -314,9 +314,11 @@ TEST(ShapeBodies, PlayerWalksUpARealStaircase) {
       Capsule capsule{0.3, box.centre, {0.0, 0.6, 0.0}};
       double highest = 0.0;
       DVec3 centre = box.centre;
+      double falling = 0.0;
       SlideResult result;
-      for (int frame = 0; frame < 400; ++frame) {
-        const DVec3 step = 0.06 * ahead - DVec3(0.0, 0.02, 0.0);
+      for (int frame = 0; frame < 600; ++frame) {
+        falling = result.is_on_floor ? 0.01 : falling + 0.004;
+        const DVec3 step = 0.06 * ahead - DVec3(0.0, falling, 0.0);
         result =
             is_round ? move_and_slide(tracer, capsule, step, walking()) : move_and_slide(tracer, box, step, walking());
         ASSERT_LT(result.centre.y - centre.y, 0.61) << "one step at a time, frame " << frame;
