@@ -62,7 +62,7 @@ std::vector<std::string> shell_lines(const std::string& page) {
 // By day, commands that render images do so in fewer pixels than the page says: most of their time goes into pixels.
 std::string with_small_images(const std::string& line) {
   constexpr std::string_view kRender = "quoin render ";
-  constexpr const char* kSmall = "--size 160x90";
+  constexpr const char* kSmall = "--size 64x36";
   if (quoin::is_nightly() || !line.starts_with(kRender)) return line;
   static const std::regex size("--size [0-9]+x[0-9]+");
   if (std::regex_search(line, size)) return std::regex_replace(line, size, kSmall);

@@ -173,7 +173,10 @@ TEST(DensityEdits, MatchPlainFieldAndReportReachedChunks) {
       const RandomEdit edit(random);
       const std::vector<IVec3> changed = edit.apply(plain);
       EXPECT_EQ(edit.apply(grid), static_cast<std::int64_t>(changed.size()));
-      ASSERT_NO_FATAL_FAILURE(expect_equal(grid, plain));
+      // By day every second round compares all samples.
+      if (is_nightly() || round % 2 == 1) {
+        ASSERT_NO_FATAL_FAILURE(expect_equal(grid, plain));
+      }
       EXPECT_EQ(follower.is_behind(grid), !changed.empty());
       const int reach = std::array{0, 1, 5, 12, 33, 64}[random() % 6];
       EXPECT_EQ(follower.take(grid, reach), chunks_reached(changed, reach)) << "reach " << reach;

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/work/nightly_for_tests.h"
 #include "grid/change_follower_for_tests.h"
 #include "grid/density/density_oracle.h"
 
@@ -97,7 +98,10 @@ TEST(DensityGrid, MatchesPlainFieldUnderRandomEdits) {
     const int reach = static_cast<int>(random() % 65);
     EXPECT_EQ(follower.take(grid, reach), chunks_reached(changed, reach));
     if (round == 11) grid.compact();
-    ASSERT_NO_FATAL_FAILURE(expect_that_of(grid, plain));
+    // By day every second round compares all samples.
+    if (is_nightly() || round % 2 == 1) {
+      ASSERT_NO_FATAL_FAILURE(expect_that_of(grid, plain));
+    }
   }
 }
 

@@ -27,9 +27,10 @@ class PlainField {
 
   template <class Visit>
   void for_each(Visit&& visit) {
+    DensitySample* sample = samples_.data();  // in the order of `at`
     for (int z = box_.min.z; z < box_.max.z; ++z) {
       for (int y = box_.min.y; y < box_.max.y; ++y) {
-        for (int x = box_.min.x; x < box_.max.x; ++x) visit(IVec3{x, y, z}, at({x, y, z}));
+        for (int x = box_.min.x; x < box_.max.x; ++x, ++sample) visit(IVec3{x, y, z}, *sample);
       }
     }
   }

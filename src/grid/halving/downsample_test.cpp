@@ -34,7 +34,9 @@ class Oracle {
   Oracle(const Grid& grid, const VoxelRegistry& types) : grid_(&grid), types_(&types) {}
 
   [[nodiscard]] VoxelType cell(IVec3 at) const {
-    bool is_solid = count(at) >= 4;
+    const int voxels = count(at);
+    if (voxels == 0) return kAir;
+    bool is_solid = voxels >= 4;
     for (int axis = 0; axis < 3; ++axis) is_solid |= is_kept_rod(at, axis);
     return is_solid ? type(at) : kAir;
   }

@@ -2,7 +2,10 @@
 
 #include <array>
 #include <functional>
+#include <optional>
 #include <vector>
+
+#include <glm/common.hpp>
 
 #include <quoin/core/hash.h>
 #include <quoin/grid/density_chunk.h>
@@ -15,14 +18,20 @@ inline constexpr float kBand = 8.0F;
 inline constexpr SmoothOcclusion kForms[] = {SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted,
                                              SmoothOcclusion::WeightedPublished, SmoothOcclusion::SoftShare};
 
-inline DensityChunk chunk_of_field(const std::function<double(IVec3)>& field, IVec3 chunk = IVec3{0}) {
-  DensityChunk out(stored_density(kBand, kBand));
+/// Returns a chunk of a field. Samples outside the box `within` are air, and not computed.
+inline DensityChunk chunk_of_field(const std::function<double(IVec3)>& field, IVec3 chunk = IVec3{0},
+                                   const std::optional<IBox>& within = std::nullopt) {
+  const Half air = stored_density(kBand, kBand);
+  DensityChunk out(air);
+  const IVec3 corner = chunk * kChunkEdge;
+  const IVec3 first = within ? glm::clamp(within->min - corner, 0, kChunkEdge) : IVec3(0);
+  const IVec3 end = within ? glm::clamp(within->max - corner, 0, kChunkEdge) : IVec3(kChunkEdge);
   std::array<Half, kChunkEdge> row{};
-  for (int z = 0; z < kChunkEdge; ++z) {
-    for (int y = 0; y < kChunkEdge; ++y) {
-      for (int x = 0; x < kChunkEdge; ++x) {
-        row[static_cast<std::size_t>(x)] =
-            stored_density(static_cast<float>(field(chunk * kChunkEdge + IVec3(x, y, z))), kBand);
+  row.fill(air);
+  for (int z = first.z; z < end.z && first.x < end.x; ++z) {
+    for (int y = first.y; y < end.y; ++y) {
+      for (int x = first.x; x < end.x; ++x) {
+        row[static_cast<std::size_t>(x)] = stored_density(static_cast<float>(field(corner + IVec3(x, y, z))), kBand);
       }
       out.write_row(y, z, row);
     }
@@ -34,9 +43,10 @@ inline DensityChunk chunk_of_field(const std::function<double(IVec3)>& field, IV
 /// Chunks of a field around the origin's, all 27.
 class World {
  public:
-  explicit World(const std::function<double(IVec3)>& field) {
+  /// `within`: as in `chunk_of_field`.
+  explicit World(const std::function<double(IVec3)>& field, const std::optional<IBox>& within = std::nullopt) {
     for (int i = 0; i < 27; ++i) {
-      chunks_.push_back(chunk_of_field(field, Neighbourhood::offset(i)));
+      chunks_.push_back(chunk_of_field(field, Neighbourhood::offset(i), within));
     }
   }
   [[nodiscard]] DensityNeighbourhood around() const {

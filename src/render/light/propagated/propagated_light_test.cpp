@@ -188,11 +188,12 @@ class Search {
         if (levels_[index(voxel)][c] != level || absorbs(voxel, channel)) continue;
         for (const Direction direction : kDirections) {
           const IVec3 next = voxel + normal_of(direction);
-          if (!box_.contains(next) || !passes(next, channel) || covers(voxel, direction) ||
-              covers(next, static_cast<Direction>(static_cast<int>(direction) ^ 1))) {
-            continue;
-          }
-          const bool falls = channel == 0 && level == 15 && direction == Direction::NegY && !absorbs(next, channel);
+          const bool may_fall = channel == 0 && level == 15 && direction == Direction::NegY;
+          // Voxels that are already as bright stay as they are; most do.
+          if (!box_.contains(next) || levels_[index(next)][c] >= level - (may_fall ? 0 : 1)) continue;
+          if (!passes(next, channel) || covers(voxel, direction)) continue;
+          if (covers(next, static_cast<Direction>(static_cast<int>(direction) ^ 1))) continue;
+          const bool falls = may_fall && !absorbs(next, channel);
           raise(next, level - std::max(cost(next), falls ? 0 : 1));
         }
       }
