@@ -42,13 +42,15 @@ endfunction()
 # Compiles the sources of a folder together, at most nine at a time: a third of compile time is spent on headers and
 # templates that each source would parse and instantiate separately. Names in a folder's anonymous namespaces must
 # therefore differ. Sources with their own definitions or flags are excluded.
-# Usage: quoin_compile_together(TARGET [ONLY FOLDER...] [EXCEPT FOLDER...]); ONLY includes folders below, EXCEPT does not.
+# ACROSS takes the sources of all folders for those of one.
+# Usage: quoin_compile_together(TARGET [ACROSS] [ONLY FOLDER...] [EXCEPT FOLDER...]); ONLY includes folders below, EXCEPT
+# does not.
 option(QUOIN_COMPILE_TOGETHER "Compile sources of a folder together" ${PROJECT_IS_TOP_LEVEL})
 function(quoin_compile_together target)
   if(NOT QUOIN_COMPILE_TOGETHER)
     return()
   endif()
-  cmake_parse_arguments(PARSE_ARGV 1 chosen "" "" "ONLY;EXCEPT")
+  cmake_parse_arguments(PARSE_ARGV 1 chosen "ACROSS" "" "ONLY;EXCEPT")
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     # GCC takes the sources for headers, in which members must not be of types of anonymous namespaces.
     target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
@@ -73,6 +75,9 @@ function(quoin_compile_together target)
     endif()
     if(chosen_ONLY AND NOT folder MATCHES "${only}")
       continue()
+    endif()
+    if(chosen_ACROSS)
+      set(folder ${target})
     endif()
     string(MAKE_C_IDENTIFIER "${folder}" folder)
     list(APPEND folders ${folder})

@@ -187,7 +187,7 @@ Result<GridMesh> mesh_of(const Scene& from, GridHandle handle, const quoin_mesh_
 }
 
 template <class Mesh>
-quoin_status give(Mesh mesh, quoin_mesh* out) {
+quoin_status give_mesh(Mesh mesh, quoin_mesh* out) {
   *out = handles().put(std::make_shared<MeshBody>(std::move(mesh)));
   return QUOIN_OK;
 }
@@ -345,7 +345,7 @@ quoin_status quoin_grid_mesh(quoin_scene scene, std::size_t grid, const quoin_me
       if (textures == nullptr) return fail(QUOIN_BAD_HANDLE, "no textures have this handle");
     }
     auto mesh = mesh_of(body.loaded.scene, body.numbers.grids[grid], *given, textures.get());
-    return mesh ? give(std::move(*mesh), out) : fail(mesh.error());
+    return mesh ? give_mesh(std::move(*mesh), out) : fail(mesh.error());
   });
 }
 
@@ -356,7 +356,7 @@ quoin_status quoin_surface_nets(const quoin_array* array, double iso, std::int32
     options.iso = iso;
     options.solid = solid_below == 0 ? SolidSide::Above : SolidSide::Below;
     auto surface = surface_from_array(view_of(given), options, threads_of(threads), progress());
-    return surface ? give(std::move(*surface), out) : fail(surface.error());
+    return surface ? give_mesh(std::move(*surface), out) : fail(surface.error());
   });
 }
 
@@ -374,7 +374,7 @@ quoin_status quoin_mesh_labels(const quoin_array* array, std::int64_t background
                                                      static_cast<std::int64_t>(one.index_count)});
     }
     mesh.surfaces = std::move(*surfaces);
-    return give(std::move(mesh), out);
+    return give_mesh(std::move(mesh), out);
   });
 }
 

@@ -139,7 +139,7 @@ std::vector<quoin_camera> cameras_of(const LoadedScene& loaded) {
   return all;
 }
 
-constexpr double kFurthest = 1e9;  // of cameras and lamps, so that they fit a file's floats
+constexpr double kFurthestPosition = 1e9;  // of cameras and lamps, so that they fit a file's floats
 
 DVec3 point_of(const double (&given)[3]) {
   return {given[0], given[1], given[2]};
@@ -183,7 +183,7 @@ const char* take(const quoin_camera& given, const LoadedScene& loaded, FileCamer
   camera.right = point_of(given.right);
   camera.up = point_of(given.up);
   camera.forward = point_of(given.forward);
-  if (!is_within(camera.position, kFurthest)) return "the camera's position is out of range";
+  if (!is_within(camera.position, kFurthestPosition)) return "the camera's position is out of range";
   const auto is = [](double value, double wanted) { return std::abs(value - wanted) <= kRoughly; };
   for (const DVec3& axis : {camera.right, camera.up, camera.forward}) {
     if (!is(glm::dot(axis, axis), 1.0)) return "right, up and forward must be unit vectors";
@@ -192,7 +192,7 @@ const char* take(const quoin_camera& given, const LoadedScene& loaded, FileCamer
   if (!is(right.x, camera.right.x) || !is(right.y, camera.right.y) || !is(right.z, camera.right.z))
     return "right must be forward x up";
   if (given.is_orthographic != 0) {
-    if (!(given.view_height > 0.0 && given.view_height <= kFurthest)) return "view_height is out of range";
+    if (!(given.view_height > 0.0 && given.view_height <= kFurthestPosition)) return "view_height is out of range";
     camera.projection = Camera::Projection::Orthographic;
     camera.view_height = given.view_height;
   } else {
@@ -200,14 +200,15 @@ const char* take(const quoin_camera& given, const LoadedScene& loaded, FileCamer
       return "the field of view must be between 0 and 180 degrees";
     camera.vertical_fov_radians = given.vertical_fov_degrees / kDegrees;
   }
-  if (!(given.focus_distance >= 0.0 && given.focus_distance <= kFurthest)) return "focus_distance is out of range";
+  if (!(given.focus_distance >= 0.0 && given.focus_distance <= kFurthestPosition))
+    return "focus_distance is out of range";
   out.number = given.number;
   out.focus_distance = given.focus_distance;
   return nullptr;
 }
 
 const char* take(const quoin_lamp& given, Lamp& lamp) {
-  if (!is_within(point_of(given.position), kFurthest)) return "the lamp's position is out of range";
+  if (!is_within(point_of(given.position), kFurthestPosition)) return "the lamp's position is out of range";
   if (!is_colour(given.colour) || !is_amount(given.intensity)) return "the lamp's colour or intensity is out of range";
   if (!(given.range >= 0.0)) return "the lamp's range is negative";
   lamp.name = text_in(given.name);

@@ -22,7 +22,7 @@ namespace quoin::c {
 namespace {
 
 thread_local std::string last_error;
-constexpr std::int64_t kFurthest = 1 << 30;  // of a voxel from its grid's origin
+constexpr std::int64_t kFurthestVoxel = 1 << 30;  // of a voxel from its grid's origin
 
 thread_local Progress listener;
 
@@ -37,7 +37,7 @@ quoin_status give(Result<LoadedScene> loaded, quoin_scene* out) {
 
 bool is_in_range(const std::int32_t min[3], const std::int32_t shape[3]) {
   for (int axis = 0; axis < 3; ++axis) {
-    if (shape[axis] < 0 || std::abs(std::int64_t{min[axis]}) + shape[axis] > kFurthest) return false;
+    if (shape[axis] < 0 || std::abs(std::int64_t{min[axis]}) + shape[axis] > kFurthestVoxel) return false;
   }
   return true;
 }
@@ -56,10 +56,10 @@ const char* validate_array(const quoin_array& array) {
   if (array.scalar != QUOIN_UINT8 && array.scalar != QUOIN_UINT16)
     return "an array of types must be QUOIN_UINT8 or QUOIN_UINT16";
   for (int axis = 0; axis < 3; ++axis) {
-    if (array.shape[axis] <= 0 || array.shape[axis] > kFurthest) return "the array's shape is out of range";
-    if (!(std::abs(array.origin[axis]) < static_cast<double>(kFurthest) / 2.0))
+    if (array.shape[axis] <= 0 || array.shape[axis] > kFurthestVoxel) return "the array's shape is out of range";
+    if (!(std::abs(array.origin[axis]) < static_cast<double>(kFurthestVoxel) / 2.0))
       return "the array's origin is out of range";
-    if (std::abs(array.origin[axis]) + static_cast<double>(array.shape[axis]) > static_cast<double>(kFurthest))
+    if (std::abs(array.origin[axis]) + static_cast<double>(array.shape[axis]) > static_cast<double>(kFurthestVoxel))
       return "the array extends out of range";
   }
   return nullptr;

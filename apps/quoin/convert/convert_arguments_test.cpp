@@ -15,18 +15,18 @@ namespace quoin::tool {
 
 namespace {
 
-std::string fault_of(const std::string& line) {
+std::string convert_fault_of(const std::string& line) {
   return ParsedLine<ConvertArguments>(line, add_convert_options).fault;
 }
 
-ConvertArguments arguments_of(const std::string& line) {
+ConvertArguments convert_arguments_of(const std::string& line) {
   const ParsedLine<ConvertArguments> parsed(line, add_convert_options);
   EXPECT_EQ(parsed.fault, "") << line;
   return parsed.arguments;
 }
 
 MeshLoadOptions options_of(const std::string& options) {
-  return arguments_of("in.obj out.json " + options).options.common.load.mesh;
+  return convert_arguments_of("in.obj out.json " + options).options.common.load.mesh;
 }
 
 /// A command line that breaks a rule, its usage error, and a similar command line that keeps the rule.
@@ -38,8 +38,8 @@ struct RuleCase {
 
 void expect_rules(const std::vector<RuleCase>& cases) {
   for (const RuleCase& each : cases) {
-    EXPECT_EQ(fault_of(each.breaking), each.fault) << each.breaking;
-    EXPECT_EQ(fault_of(each.fitting), "") << each.fitting;
+    EXPECT_EQ(convert_fault_of(each.breaking), each.fault) << each.breaking;
+    EXPECT_EQ(convert_fault_of(each.fitting), "") << each.fitting;
   }
 }
 
@@ -68,11 +68,12 @@ TEST(ConvertArguments, RefusesFormatsThatOutputCannotHave) {
       {"a.vox - --to gltf", "cannot write .gltf to standard output: it consists of several files", "a.vox - --to glb"},
       {"a.vox - --to glb --json", "cannot use --json: OUT is standard output", "a.vox b.glb --json"},
   });
-  EXPECT_TRUE(fault_of("a.vox -").starts_with("writing to standard output needs --to FORMAT, one of ."));
-  EXPECT_TRUE(fault_of("a.vox - --to xyz").starts_with("writing to standard output needs --to FORMAT, one of ."));
-  EXPECT_TRUE(fault_of("a.vox --to xyz").starts_with("--to: unknown extension; use one of .3mf"));
-  EXPECT_TRUE(fault_of("a.vox --to xyz").ends_with(", not \"xyz\""));
-  EXPECT_TRUE(fault_of("a.vox b.xyz").starts_with("b.xyz: unknown extension; use one of .3mf"));
+  EXPECT_TRUE(convert_fault_of("a.vox -").starts_with("writing to standard output needs --to FORMAT, one of ."));
+  EXPECT_TRUE(
+      convert_fault_of("a.vox - --to xyz").starts_with("writing to standard output needs --to FORMAT, one of ."));
+  EXPECT_TRUE(convert_fault_of("a.vox --to xyz").starts_with("--to: unknown extension; use one of .3mf"));
+  EXPECT_TRUE(convert_fault_of("a.vox --to xyz").ends_with(", not \"xyz\""));
+  EXPECT_TRUE(convert_fault_of("a.vox b.xyz").starts_with("b.xyz: unknown extension; use one of .3mf"));
 }
 
 TEST(ConvertArguments, RefusesContradictoryMeshOptions) {
@@ -126,10 +127,10 @@ TEST(ConvertArguments, AcceptsContentOnlyForFormatsThatHoldIt) {
                                                 {"--animate", "--animate", "stl", "glb"},
                                                 {"--compress", "--compress", "ply", "glb"},
                                                 {"--quantize", "--quantize", "3mf", "gltf"}}) {
-    const std::string fault = fault_of("a.vox b." + each.without + " " + each.option);
+    const std::string fault = convert_fault_of("a.vox b." + each.without + " " + each.option);
     EXPECT_TRUE(fault.starts_with("cannot write " + each.named + " to ." + each.without + ": ")) << fault;
-    EXPECT_EQ(fault_of("a.vox b." + each.with + " " + each.option), "");
-    EXPECT_EQ(fault_of("a.vox --to " + each.without + " " + each.option), fault);
+    EXPECT_EQ(convert_fault_of("a.vox b." + each.with + " " + each.option), "");
+    EXPECT_EQ(convert_fault_of("a.vox --to " + each.without + " " + each.option), fault);
   }
 }
 
@@ -138,10 +139,10 @@ TEST(ConvertArguments, AcceptsMeshOptionsOnlyForMeshes) {
        {"--mesher greedy", "--scale 2", "--up z", "--simplify 1", "--smoothness 1", "--colours sharp",
         "--texture palette", "--no-ao", "--watertight", "--no-unite", "--ao-attribute", "--ao-form share",
         "--light propagated", "--lights", "--animate", "--animate --fps 3", "--compress", "--quantize"}) {
-    EXPECT_EQ(fault_of("a.vox b.glb " + options), "");
+    EXPECT_EQ(convert_fault_of("a.vox b.glb " + options), "");
     for (const auto& [files, output] : std::vector<std::pair<std::string, std::string>>{
              {"a.vox b.json", "b.json"}, {"a.vox --to .qb", ".qb"}, {"a.vox - --to vox", ".vox"}}) {
-      const std::string fault = fault_of(files + " " + options);
+      const std::string fault = convert_fault_of(files + " " + options);
       EXPECT_TRUE(fault.starts_with("--mesher, --no-ao, ")) << files << " " << options << ": " << fault;
       EXPECT_TRUE(fault.ends_with(" need a mesh format; " + output + " is not one")) << fault;
     }
@@ -156,38 +157,39 @@ TEST(ConvertArguments, RefusesOptionsOfMissingRawVolume) {
 }
 
 TEST(ConvertArguments, SettlesFilesAndFormat) {
-  const ConvertArguments one = arguments_of("a.vox b.glb");
+  const ConvertArguments one = convert_arguments_of("a.vox b.glb");
   EXPECT_EQ(one.options.common.input, "a.vox");
   EXPECT_EQ(one.options.output, "b.glb");
   EXPECT_EQ(one.format->format, FileFormat::Glb);
   EXPECT_FALSE(one.has_many_inputs());
-  const ConvertArguments many = arguments_of("a.vox b.vox --to .ply --out-dir d");
+  const ConvertArguments many = convert_arguments_of("a.vox b.vox --to .ply --out-dir d");
   EXPECT_EQ(many.many.inputs, (std::vector<std::filesystem::path>{"a.vox", "b.vox"}));
   EXPECT_EQ(many.many.folder, "d");
   EXPECT_EQ(many.format->format, FileFormat::Ply);
   EXPECT_TRUE(many.has_many_inputs());
-  const ConvertArguments stream = arguments_of("a.vox - --to vox");
+  const ConvertArguments stream = convert_arguments_of("a.vox - --to vox");
   EXPECT_TRUE(stream.is_to_stream());
   EXPECT_FALSE(stream.has_many_inputs());
   EXPECT_EQ(stream.format->format, FileFormat::Vox);
 }
 
 TEST(ConvertArguments, SettlesGivenOptions) {
-  const ConvertOptions plain = arguments_of("a.obj b.glb").options;
+  const ConvertOptions plain = convert_arguments_of("a.obj b.glb").options;
   EXPECT_FALSE(plain.has_field_occlusion);
   EXPECT_FALSE(plain.as_voxels);
   EXPECT_EQ(plain.mesh_input, "");
   EXPECT_FALSE(plain.mesher);
   const ConvertOptions options =
-      arguments_of("a.obj b.glb --solid --max-colours 9 --ao-power 3 --ao-form weighted --mesher smooth --iso 0.1")
+      convert_arguments_of(
+          "a.obj b.glb --solid --max-colours 9 --ao-power 3 --ao-form weighted --mesher smooth --iso 0.1")
           .options;
   EXPECT_TRUE(options.has_field_occlusion);
   EXPECT_TRUE(options.as_voxels);
   EXPECT_EQ(options.mesh_input, "--solid");
   EXPECT_EQ(options.mesher, Mesher::Smooth);
   EXPECT_EQ(options.iso, 0.1);
-  EXPECT_TRUE(arguments_of("a.vox b.glb --light propagated").options.light);
-  EXPECT_FALSE(arguments_of("a.vox b.glb --light none").options.light);
+  EXPECT_TRUE(convert_arguments_of("a.vox b.glb --light propagated").options.light);
+  EXPECT_FALSE(convert_arguments_of("a.vox b.glb --light none").options.light);
 }
 
 TEST(MeshInput, SelectsSurfaceAndInside) {
@@ -232,7 +234,7 @@ OpenedInput input_of(std::optional<FileFormat> format) {
 
 /// Returns the error of the rules that need the opened input, or "".
 std::string input_fault(const std::string& line, std::optional<FileFormat> input, bool is_one_of_many = false) {
-  ConvertArguments arguments = arguments_of(line);
+  ConvertArguments arguments = convert_arguments_of(line);
   arguments.options.is_one_of_many = is_one_of_many;
   const Status fits = check_input_rules(arguments.options, *arguments.format, input_of(input));
   return fits ? "" : to_string(fits.error());
@@ -289,20 +291,20 @@ TEST(ConvertInput, RefusesSmoothOptionsForBlocks) {
     EXPECT_EQ(input_fault(line + " --mesher smooth", FileFormat::Vox), "") << options;
     // Only its content decides on the mesher.
     EXPECT_EQ(input_fault(line, FileFormat::Scene), "") << options;
-    const ConvertOptions read = arguments_of(line).options;
+    const ConvertOptions read = convert_arguments_of(line).options;
     EXPECT_TRUE(check_mesher_rules(read, Mesher::Smooth)) << options;
     const Status refused = check_mesher_rules(read, Mesher::Greedy);
     ASSERT_FALSE(refused) << options;
     EXPECT_EQ(to_string(refused.error()), fault) << options;
   }
-  EXPECT_FALSE(check_mesher_rules(arguments_of("in out.glb --simplify 1").options, Mesher::Greedy));
-  EXPECT_TRUE(check_mesher_rules(arguments_of("in out.glb").options, Mesher::Greedy));
+  EXPECT_FALSE(check_mesher_rules(convert_arguments_of("in out.glb --simplify 1").options, Mesher::Greedy));
+  EXPECT_TRUE(check_mesher_rules(convert_arguments_of("in out.glb").options, Mesher::Greedy));
 }
 
 TEST(ConvertInput, RequiresFormatOfFrom) {
-  const ConvertOptions options = arguments_of("in out.glb --from vox").options;
+  const ConvertOptions options = convert_arguments_of("in out.glb --from vox").options;
   EXPECT_TRUE(check_input_format(options, input_of(FileFormat::Vox)));
-  EXPECT_TRUE(check_input_format(arguments_of("in out.glb").options, input_of(FileFormat::Vox)));
+  EXPECT_TRUE(check_input_format(convert_arguments_of("in out.glb").options, input_of(FileFormat::Vox)));
   const Status refused = check_input_format(options, input_of(FileFormat::Nifti));
   ASSERT_FALSE(refused);
   EXPECT_EQ(to_string(refused.error()), "in: the format is nifti, not vox");

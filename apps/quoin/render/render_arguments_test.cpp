@@ -14,11 +14,11 @@ namespace quoin::tool {
 
 namespace {
 
-std::string fault_of(const std::string& options) {
+std::string render_fault_of(const std::string& options) {
   return ParsedLine<RenderArguments>("in.vox -o out.png " + options, add_render_options).fault;
 }
 
-RenderArguments arguments_of(const std::string& options) {
+RenderArguments render_arguments_of(const std::string& options) {
   const ParsedLine<RenderArguments> parsed("in.vox -o out.png " + options, add_render_options);
   EXPECT_EQ(parsed.fault, "") << options;
   return parsed.arguments;
@@ -132,7 +132,7 @@ TEST(RenderArguments, AcceptOptionsOnlyInFittingModes) {
     const std::set<std::string> fitting{std::istream_iterator<std::string>(words), {}};
     for (const Mode& mode : kModes) {
       const std::string line = mode.options + " " + sample.option + " " + sample.value;
-      const std::string fault = fault_of(line);
+      const std::string fault = render_fault_of(line);
       EXPECT_EQ(fault.empty(), fitting.contains(mode.name)) << line << ": " << fault;
       EXPECT_TRUE(fault.empty() || fault.starts_with("--")) << line << ": " << fault;
     }
@@ -170,7 +170,7 @@ TEST(RenderArguments, RefusesOptionsThatContradictEachOther) {
       {"--device 0", "--device needs --backend vulkan"},
       {"--watch --json", "--watch and --json cannot be used together"},
       {"--depth d.png", "--depth: the name must end in .pfm, not \"d.png\""}};
-  for (const auto& [options, fault] : faults) EXPECT_EQ(fault_of(options), fault) << options;
+  for (const auto& [options, fault] : faults) EXPECT_EQ(render_fault_of(options), fault) << options;
 }
 
 TEST(RenderArguments, RefusesOutputsThatCannotHoldImage) {
@@ -201,16 +201,16 @@ TEST(RenderArguments, NamesOptionOfRefusedValue) {
         "--slice w:0.5",     "--slice y:2",        "--detail far",     "--backend gpu",
         "--device ''"}) {
     const std::string name = options.substr(0, options.find(' '));
-    EXPECT_TRUE(fault_of(options).starts_with(name + ": ")) << options << ": " << fault_of(options);
+    EXPECT_TRUE(render_fault_of(options).starts_with(name + ": ")) << options << ": " << render_fault_of(options);
   }
 }
 
 TEST(RenderArguments, DefaultsToNaturalLightAndFewSamples) {
-  const RenderArguments plain = arguments_of("");
+  const RenderArguments plain = render_arguments_of("");
   EXPECT_EQ(plain.render.light, natural_light());
   EXPECT_EQ(plain.render.samples, 4);
-  EXPECT_EQ(arguments_of("--light path").render.samples, 64);
-  EXPECT_EQ(arguments_of("--light path --samples 3").render.samples, 3);
+  EXPECT_EQ(render_arguments_of("--light path").render.samples, 64);
+  EXPECT_EQ(render_arguments_of("--light path --samples 3").render.samples, 3);
   Environment environment;
   plain.environment.apply_to(environment);
   EXPECT_EQ(environment, Environment::natural());
@@ -221,7 +221,7 @@ TEST(RenderArguments, DefaultsToNaturalLightAndFewSamples) {
 
 TEST(RenderArguments, ReadsLight) {
   const RenderArguments day =
-      arguments_of("--sun 0,2,0 --fixed-sky --plain-glass --lamps 3 --exposure 2 --shadow-distance 9");
+      render_arguments_of("--sun 0,2,0 --fixed-sky --plain-glass --lamps 3 --exposure 2 --shadow-distance 9");
   EXPECT_FALSE(day.render.light.glass_surfaces);
   EXPECT_EQ(day.render.light.max_lamps, 3);
   EXPECT_EQ(day.render.light.shadow_distance_voxels, 9.0);
@@ -231,15 +231,15 @@ TEST(RenderArguments, ReadsLight) {
   EXPECT_EQ(environment.sky.model, SkyModel::Fixed);
   EXPECT_EQ(environment.exposure, 2.0);
   Environment night;
-  arguments_of("--sun off").environment.apply_to(night);
+  render_arguments_of("--sun off").environment.apply_to(night);
   EXPECT_EQ(night.sun.brightness, 0.0);
   EXPECT_EQ(night.sun.direction, Environment::natural().sun.direction);
-  EXPECT_TRUE(arguments_of("--light path --exposure auto").is_exposure_automatic);
-  EXPECT_EQ(arguments_of("--light propagated").render.light.model, LightModel::Propagated);
+  EXPECT_TRUE(render_arguments_of("--light path --exposure auto").is_exposure_automatic);
+  EXPECT_EQ(render_arguments_of("--light propagated").render.light.model, LightModel::Propagated);
 }
 
 TEST(RenderArguments, PresetsAndOcclusionSelectShading) {
-  const auto light = [](const std::string& options) { return arguments_of(options).render.light; };
+  const auto light = [](const std::string& options) { return render_arguments_of(options).render.light; };
   EXPECT_EQ(light("--preset no-ao").occlusion_mode, OcclusionMode::Off);
   EXPECT_EQ(light("--ao vertex").occlusion_mode, OcclusionMode::Vertex);
   EXPECT_FALSE(light("--preset no-shadows").shadows);
@@ -250,7 +250,7 @@ TEST(RenderArguments, PresetsAndOcclusionSelectShading) {
 }
 
 TEST(RenderArguments, UsesMoreRaysForLongOcclusion) {
-  const auto light = [](const std::string& options) { return arguments_of(options).render.light; };
+  const auto light = [](const std::string& options) { return render_arguments_of(options).render.light; };
   EXPECT_EQ(light("--ao-distance 12").occlusion_rays, natural_light().occlusion_rays);
   EXPECT_EQ(light("--ao-distance 13").occlusion_rays, 16);
   EXPECT_EQ(light("--ao-distance 13 --ao-rays 5").occlusion_rays, 5);
@@ -258,28 +258,29 @@ TEST(RenderArguments, UsesMoreRaysForLongOcclusion) {
 }
 
 TEST(RenderArguments, LodColoursImplyPixels) {
-  EXPECT_FALSE(arguments_of("").render.detail.policy);
-  EXPECT_FALSE(arguments_of("--lod-colours --detail near").render.detail.policy);
-  EXPECT_EQ(arguments_of("--lod-colours").render.detail.policy->rule, DetailPolicy::Rule::ByPixels);
-  EXPECT_EQ(arguments_of("--detail radius").render.detail.policy->rule, DetailPolicy::Rule::ByRadius);
+  EXPECT_FALSE(render_arguments_of("").render.detail.policy);
+  EXPECT_FALSE(render_arguments_of("--lod-colours --detail near").render.detail.policy);
+  EXPECT_EQ(render_arguments_of("--lod-colours").render.detail.policy->rule, DetailPolicy::Rule::ByPixels);
+  EXPECT_EQ(render_arguments_of("--detail radius").render.detail.policy->rule, DetailPolicy::Rule::ByRadius);
 }
 
 TEST(RenderArguments, ReadsCamerasAndSeries) {
-  const RenderArguments camera = arguments_of("--camera 1,-2.5,3 --look-at 0,0,0 --fov 30");
+  const RenderArguments camera = render_arguments_of("--camera 1,-2.5,3 --look-at 0,0,0 --fov 30");
   EXPECT_EQ(camera.position, DVec3(1, -2.5, 3));
   EXPECT_EQ(camera.fov_degrees, 30.0);
-  EXPECT_EQ(arguments_of("--camera file:7").file_camera, 7);
-  const RenderArguments frames = arguments_of("--frames 2:5 --view left");
+  EXPECT_EQ(render_arguments_of("--camera file:7").file_camera, 7);
+  const RenderArguments frames = render_arguments_of("--frames 2:5 --view left");
   EXPECT_TRUE(frames.is_image_series() && frames.has_view());
   EXPECT_EQ(frames.frames->first, 2);
   EXPECT_EQ(frames.frames->last, 5);
   EXPECT_EQ(frames.view, View::Left);
-  EXPECT_TRUE(arguments_of("--turntable 5").has_view());
+  EXPECT_TRUE(render_arguments_of("--turntable 5").has_view());
 }
 
 TEST(RenderArguments, ReadsPathTracing) {
   const PathArguments path =
-      arguments_of("--light path --sky sky.HDR --sky-turn 90 --no-ground --fog 0.5,8 --bloom 0.1 --look plain").path;
+      render_arguments_of("--light path --sky sky.HDR --sky-turn 90 --no-ground --fog 0.5,8 --bloom 0.1 --look plain")
+          .path;
   EXPECT_EQ(path.sky->model, SkyModel::Image);
   EXPECT_EQ(path.sky->image, "sky.HDR");
   EXPECT_EQ(path.sky_turn_degrees, 90.0);
@@ -287,14 +288,14 @@ TEST(RenderArguments, ReadsPathTracing) {
   EXPECT_EQ(path.fog->top, 8.0);
   EXPECT_EQ(path.bloom->mix, 0.1);
   EXPECT_FALSE(path.uses_file_look);
-  EXPECT_EQ(arguments_of("--light path --ground").path.ground, true);
-  EXPECT_EQ(arguments_of("--light path --no-ground --ground").path.ground, true) << "the last applies";
-  EXPECT_EQ(arguments_of("--light path").path.ground, std::nullopt);
+  EXPECT_EQ(render_arguments_of("--light path --ground").path.ground, true);
+  EXPECT_EQ(render_arguments_of("--light path --no-ground --ground").path.ground, true) << "the last applies";
+  EXPECT_EQ(render_arguments_of("--light path").path.ground, std::nullopt);
 }
 
 TEST(RenderArguments, ReadsVolumesAndSlices) {
-  const RenderArguments raw =
-      arguments_of("--raw-size 2x3x4 --raw-type uint16 --raw-order big --iso 0.5 --preset density --slice z:0.25");
+  const RenderArguments raw = render_arguments_of(
+      "--raw-size 2x3x4 --raw-type uint16 --raw-order big --iso 0.5 --preset density --slice z:0.25");
   ASSERT_TRUE(raw.common.load.raw);
   EXPECT_EQ(raw.common.load.raw->size, IVec3(2, 3, 4));
   EXPECT_EQ(raw.common.load.raw->type, ScalarType::UInt16);
