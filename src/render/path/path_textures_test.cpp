@@ -196,7 +196,7 @@ TEST(PathTextures, ShowsEqualTranslucentTexelsAsGlass) {
 
 // A block of visible cutout texels in a lake of another grid looks as one of opaque texels.
 TEST(PathTextures, ShowsTexelsWithinGlassOfAnotherGrid) {
-  const auto image_of = [](FaceAlpha alpha) {
+  const auto image_of = [](FaceAlpha alpha, std::uint8_t opacity) {
     Scene scene;
     VoxelProperties water;
     water.colour = {60, 120, 200, 30};
@@ -205,7 +205,7 @@ TEST(PathTextures, ShowsTexelsWithinGlassOfAnotherGrid) {
     const VoxelType lake = scene.types.add(water).value();
     const VoxelType ground = add_type(scene, {180, 180, 170, 255});
     const Visibility visibility = alpha == FaceAlpha::Cutout ? Visibility::Transparent : Visibility::Opaque;
-    const VoxelType type = scene.types.add(textured({.texture = noise(255), .alpha = alpha}, visibility)).value();
+    const VoxelType type = scene.types.add(textured({.texture = noise(opacity), .alpha = alpha}, visibility)).value();
     Grid grid;
     grid.fill_box({{-8, -1, -8}, {8, 0, 8}}, ground);
     grid.fill_box({{-8, 0, -8}, {8, 6, 8}}, lake);
@@ -220,7 +220,9 @@ TEST(PathTextures, ShowsTexelsWithinGlassOfAnotherGrid) {
     options.environment = physical_day();
     return path_image(scene, towards({9, 14, 12}, {0, 3, 0}), options);
   };
-  EXPECT_LT(difference(image_of(FaceAlpha::Opaque), image_of(FaceAlpha::Cutout)), 0.03);
+  const PathImage opaque = image_of(FaceAlpha::Opaque, 255);
+  EXPECT_LT(difference(opaque, image_of(FaceAlpha::Cutout, 255)), 0.001);
+  EXPECT_GT(difference(opaque, image_of(FaceAlpha::Cutout, 0)), 0.01);
 }
 
 // A dark ceiling with one lamp, whose texture lights one half, and a lamp of half the size.
