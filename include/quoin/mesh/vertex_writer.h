@@ -150,7 +150,9 @@ class VertexWriter {
     return number + 1 < colours.size() ? colours[number] : colours.back();
   }
   // Returns the number of a face in tables of faces.
-  [[nodiscard]] static std::size_t face_number(VoxelType type, Direction direction) {
+  [[nodiscard]] std::size_t face_number(VoxelType type, Direction direction) const {
+    constexpr std::size_t kNone = ~std::size_t{0} / 2;  // beyond all tables
+    if (!turned_.empty() && type >= turned_.size()) return kNone;
     return std::size_t{6} * type + static_cast<std::size_t>(direction);
   }
   // Those of a type that its state turns follow behind the faces of all types.
