@@ -216,6 +216,8 @@ struct ModelFace {
   Direction direction = Direction::PosX;
   /// True if the face lies in the voxel's side `direction`, so that a neighbour can cover it (`mask`).
   bool on_side = false;
+  /// True if sixteenths of the same model fill the whole space in front of the face, so that it cannot be seen.
+  bool is_inner = false;
   SideMask mask{};  ///< for faces on a side: the squares that it touches
   /// The eighths of voxels that darken each corner, in the order of `vertex_occlusion`: side, side, diagonal. They touch
   /// the corner, moved to the nearest half of a voxel, in front of the face. A number is 8 (x + 3 y + 9 z) + the bit of

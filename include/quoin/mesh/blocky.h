@@ -62,7 +62,8 @@ class BlockyMesher {
   /// As above; also replaces `shapes` with the visible faces of the region's shapes. With ShapeUse::Cubes there are
   /// none.
   ///
-  /// Hidden:    a face on a side of its voxel, if the neighbour covers it. Faces inside a voxel are never hidden.
+  /// Hidden:    a face on a side of its voxel, if the neighbour covers it; inside a voxel, a face that its own shape
+  ///            covers (ModelFace::is_inner).
   /// Occlusion: of a corner by the four eighths of voxels that touch it in front of the face, by the rule of
   ///            `vertex_occlusion`. The corner counts at the nearest half of a voxel; an eighth is filled in cubes that
   ///            occlude, and in opaque shapes that fill at least half of it. Inclined faces are not darkened.

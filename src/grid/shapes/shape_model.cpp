@@ -256,6 +256,7 @@ class ModelBuilder {
         }
       }
     }
+    for (ModelFace& face : m.faces) face.is_inner = is_inner(face);
     for (std::size_t i = 0; i < 8; ++i) {
       if (filled[i] >= 256) m.filled_octants |= static_cast<std::uint8_t>(1U << i);
     }
@@ -273,6 +274,28 @@ class ModelBuilder {
   }
 
  private:
+  // Returns true if all sixteenths in front of a face are filled: of a face along the axes within the voxel.
+  [[nodiscard]] bool is_inner(const ModelFace& face) const {
+    if (face.on_side || face.occluders[0][0] == kNoOccluder) return false;
+    const FaceFrame& frame = frame_of(face.direction);
+    const float plane = face.corners[0][frame.axis] * kUnit;
+    IVec3 first(glm::floor(glm::min(face.corners[0], face.corners[2]) * kUnit));
+    IVec3 last(glm::ceil(glm::max(face.corners[0], face.corners[2]) * kUnit));
+    first[frame.axis] = static_cast<int>(plane) - (frame.sign > 0 ? 0 : 1);
+    last[frame.axis] = first[frame.axis] + 1;
+    if (plane != std::floor(plane) || intersect({first, last}, {IVec3(0), IVec3(kShapeUnits)}) != IBox{first, last}) {
+      return false;
+    }
+    for (int z = first.z; z < last.z; ++z) {
+      for (int y = first.y; y < last.y; ++y) {
+        for (int x = first.x; x < last.x; ++x) {
+          if ((model_.bits[row(y, z)] >> x & 1U) == 0) return false;
+        }
+      }
+    }
+    return true;
+  }
+
   static std::size_t row(int y, int z) { return static_cast<std::size_t>(y + kShapeUnits * z); }
 
   // Removes the rounding of turns about points of the lattice: 1/4096 voxels is below what any format stores.

@@ -486,7 +486,7 @@ void append_shape_faces(const Job& job, ShapeFaceBuffer& out) {
     std::uint16_t number = 0;
     for (const ModelFace& face : voxel.model->faces) {
       const std::uint16_t own = number++;
-      if (face.on_side && is_covered(job, voxel, face)) continue;
+      if (face.is_inner || (face.on_side && is_covered(job, voxel, face))) continue;
       ShapeFace made{voxel.model, place, own, voxel.type};
       if (job.occlusion && face.occluders[0][0] != kNoOccluder) {
         made.bits |= occlusion_of(face.occluders, cell) << ShapeFace::kOcclusionShift;

@@ -134,6 +134,21 @@ FaceSet cube_faces(const Grid& grid, const VoxelRegistry& types, bool occlusion)
   return faces;
 }
 
+// Returns true if boxes of the model fill the space in front of a face: at 40 x 40 points of it.
+bool is_behind_own_boxes(const ShapeModel& model, const ModelFace& face) {
+  const Vec3 out = Vec3(normal_of(face.direction)) / 64.0F;
+  for (int i = 0; i < 40 * 40; ++i) {
+    const float u = (static_cast<float>(i % 40) + 0.5F) / 40.0F;
+    const float v = (static_cast<float>(i / 40) + 0.5F) / 40.0F;
+    const Vec3 at =
+        face.corners[0] + u * (face.corners[1] - face.corners[0]) + v * (face.corners[3] - face.corners[0]) + out;
+    const IVec3 cell(glm::floor(at * 16.0F));
+    if (!IBox{IVec3(0), IVec3(16)}.contains(cell)) return false;
+    if ((model.bits[static_cast<std::size_t>(cell.y + 16 * cell.z)] >> cell.x & 1U) == 0) return false;
+  }
+  return true;
+}
+
 using ShapeKey = std::tuple<int, int, int, std::size_t>;  // x, y, z, number of the face
 using ShapeSet = std::map<ShapeKey, UnitFace>;
 
@@ -148,6 +163,7 @@ ShapeSet shape_faces(const Grid& grid, const VoxelRegistry& types, bool occlusio
       if (face.on_side && covers(types, grid.get(at), shape_at(grid, types, at), type, face.direction, face.mask)) {
         continue;
       }
+      if (is_behind_own_boxes(*model, face)) continue;
       UnitFace made{type, {}};
       const bool is_inclined = glm::abs(face.normal[frame_of(face.direction).axis]) < 0.999F;
       for (std::size_t corner = 0; corner < 4 && occlusion && !is_inclined; ++corner) {
