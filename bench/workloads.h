@@ -2,7 +2,6 @@
 
 // The fixed worlds of the benchmarks and their check values. All mathematics in double.
 
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -10,9 +9,6 @@
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
-#include <quoin/grid/voxel_shape.h>
-
-#include "grid/shapes/shapes_for_tests.h"
 
 namespace quoin::workloads {
 
@@ -177,68 +173,6 @@ inline VoxelType cave_terrain_rock(IVec3 v) {
 inline Grid cave_terrain() {
   Grid made;
   made.edit(kCaveTerrain, [](IVec3 v, VoxelType) { return is_cave(v) ? kAir : cave_terrain_rock(v); });
-  made.compact();
-  return made;
-}
-
-/// The types of `town`: the three of terrain, then slabs, stairs, fences, posts, flowers and panes. With `is_shaped`
-/// false the same types are cubes.
-inline VoxelRegistry town_types(bool is_shaped) {
-  VoxelRegistry types = three_types();
-  const auto turns = StateOrientations::about_y_and_upside_down();
-  const std::array<VoxelProperties, 6> shaped = {
-      VoxelProperties{.name = "slab", .state_bits = 3, .orientations = turns, .shapes = shapes_for_tests::slab()},
-      VoxelProperties{.name = "stairs", .state_bits = 3, .orientations = turns, .shapes = shapes_for_tests::stairs()},
-      VoxelProperties{.name = "fence", .state_bits = 3, .shapes = shapes_for_tests::fence()},
-      VoxelProperties{.name = "post",
-                      .state_bits = 3,
-                      .orientations = StateOrientations::to_directions(),
-                      .shapes = VoxelShape::box({4, 0, 4}, {12, 16, 12})},
-      VoxelProperties{.name = "flower",
-                      .visibility = Visibility::Transparent,
-                      .state_bits = 3,
-                      .shapes = VoxelShape::crossed_plates()},
-      VoxelProperties{.name = "pane",
-                      .visibility = Visibility::Transparent,
-                      .state_bits = 3,
-                      .orientations = StateOrientations::about_y(),
-                      .shapes = VoxelShape::box({0, 0, 7}, {16, 16, 9})}};
-  for (VoxelProperties type : shaped) {
-    if (!is_shaped) type.shapes = {};
-    if (!is_shaped) type.orientations = {};
-    static_cast<void>(types.add(type));
-  }
-  return types;
-}
-
-/// A town of 9x9 chunks: W1's terrain with streets every 24 voxels. In two rows on both sides of each street, 40 % of
-/// the blocks on the ground have shapes, and 20 % are cubes of a wall up to three voxels high.
-inline Grid town() {
-  constexpr int kEdge = 9 * kChunkEdge;
-  Grid made;
-  made.edit({IVec3(0), IVec3(kEdge, kChunkEdge, kEdge)},
-            [](IVec3 v, VoxelType) { return terrain_type(v.y, height(0.25 * v.x, 0.25 * v.z)); });
-  std::uint64_t s = 42;
-  const auto next = [&](unsigned below) {
-    s ^= s << 13;
-    s ^= s >> 7;
-    s ^= s << 17;
-    return static_cast<unsigned>(s >> 33) % below;
-  };
-  const auto is_beside_street = [](int at) { return at % 24 == 0 || at % 24 == 1 || at % 24 == 5 || at % 24 == 6; };
-  const auto is_street = [](int at) { return at % 24 >= 2 && at % 24 <= 4; };
-  for (int z = 0; z < kEdge; ++z) {
-    for (int x = 0; x < kEdge; ++x) {
-      if (!(is_beside_street(x) && !is_street(z)) && !(is_beside_street(z) && !is_street(x))) continue;
-      const IVec3 at(x, static_cast<int>(height(0.25 * x, 0.25 * z)) + 1, z);
-      const unsigned kind = next(10);
-      if (kind < 4) {
-        made.set(at, static_cast<VoxelType>(4 + next(6)), {.state = next(8)});
-      } else if (kind < 6) {
-        made.fill_box({at, at + IVec3(1, 1 + static_cast<int>(next(3)), 1)}, 3);
-      }
-    }
-  }
   made.compact();
   return made;
 }

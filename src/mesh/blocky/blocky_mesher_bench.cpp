@@ -10,6 +10,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include "bench/town_workload.h"
 #include "bench/workloads.h"
 #include "core/made_with_for_tests.h"
 
@@ -176,8 +177,9 @@ BENCHMARK(count_faces)->Name("count_faces/world")->Unit(benchmark::kMicrosecond)
 
 // Meshes a town; a time is per chunk. `is_shaped` false: the same blocks as cubes.
 void mesh_town(benchmark::State& state, bool is_shaped) {
-  const Grid grid = workloads::town();
-  const VoxelRegistry types = workloads::town_types(is_shaped);
+  const Scene scene = workloads::town_scene(is_shaped);
+  const VoxelRegistry& types = scene.types;
+  const Grid& grid = scene.grids()[scene.grids().handles().front()].grid;
   std::vector<Neighbourhood> chunks;
   for (const IVec3 chunk : grid.chunks()) chunks.push_back(grid.neighbourhood(chunk));
   BlockyMesher mesher;
