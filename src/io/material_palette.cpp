@@ -563,6 +563,15 @@ PngImage FaceAtlas::image() const {
   return image;
 }
 
+PngImage MaterialPalette::face_alpha_image(std::size_t image) const {
+  const PngImage made = face_image(image);
+  PngImage grey{made.width, made.height, 3, {}};
+  for (std::size_t i = made.channels - 1; i < made.pixels.size(); i += made.channels) {
+    grey.pixels.insert(grey.pixels.end(), 3, made.channels == 4 ? made.pixels[i] : std::uint8_t{255});
+  }
+  return grey;
+}
+
 MaterialSurfaces::MaterialSurfaces(const MeshPart& part, const MaterialPalette& palette) {
   for (const MeshView& view : part.surfaces) {
     if (!view.indices.empty()) add(view, palette);

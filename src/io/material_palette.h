@@ -213,6 +213,8 @@ class MaterialPalette {
   /// Returns a texture or the atlas as an image, without alpha if it is opaque. `tint`: multiplies it in linear light,
   /// 0 to 1; not for the atlas. Requires: an image of textured faces.
   [[nodiscard]] PngImage face_image(std::size_t image, const Vec3& tint = Vec3(1.0F)) const;
+  /// Returns the alpha of a texture or the atlas as a grey image. Requires: an image of textured faces.
+  [[nodiscard]] PngImage face_alpha_image(std::size_t image) const;
   /// Returns true if textured faces use an atlas, which does not repeat.
   [[nodiscard]] bool has_face_atlas() const { return faces_ == FaceColours::Atlas; }
   /// Returns the texture coordinates of each vertex of textured faces, from the upper left corner. Textures repeat, so

@@ -164,8 +164,8 @@ struct TextureFrame {
 /// Returns the axes of a face's texture. Requires: `turn` is 0 to 3.
 [[nodiscard]] TextureFrame texture_frame(const VoxelFace& face, Direction direction);
 
-/// Returns the face that a type shows in a direction when its faces are turned (VoxelProperties::orientations): with the
-/// turn and mirror that the texture has there. Requires: `faces` is not empty; turns are 0 to 3.
+/// Returns the face that a type shows in a direction when its faces are turned (VoxelProperties::orientations): with
+/// the turn and mirror that the texture has there. Requires: `faces` is not empty; turns are 0 to 3.
 [[nodiscard]] VoxelFace turned_face(const VoxelFaces& faces, Direction direction, const AxisOrientation& orientation);
 
 /// Returns the texture coordinates of a point of a face, from the upper left corner of the texture, rightwards and

@@ -51,9 +51,9 @@ struct Quad {
     QUOIN_ASSERT(corner >= 0 && corner < 4, "0 <= corner < 4");
     return static_cast<std::uint8_t>(field(kOcclusionShift + 2 * corner, 3));
   }
-  /// Returns the orientation of the voxels' faces (VoxelProperties::orientations): `turned_face` returns the quad's face
-  /// for it. Orientations with equal faces have one here, the first: all sides of a log have the same. Types without
-  /// textures have the orientation that the state selects.
+  /// Returns the orientation of the voxels' faces (VoxelProperties::orientations): `turned_face` returns the quad's
+  /// face for it. Orientations with equal faces have one here, the first: all sides of a log have the same. Types
+  /// without textures have the orientation that the state selects.
   [[nodiscard]] AxisOrientation orientation() const {
     return AxisOrientation::at(static_cast<int>(bits >> kOrientationShift));
   }

@@ -611,13 +611,8 @@ class FaceImages {
   static Image alpha_of(const SurfaceMaterial& material) { return {true, colour_of(material).texture}; }
 
   static PngImage pixels_of(const Image& image, const MaterialPalette& palette) {
-    PngImage made = palette.face_image(image.texture, {image.red, image.green, image.blue});
-    if (!image.is_alpha) return made;
-    PngImage grey{made.width, made.height, 3, {}};
-    for (std::size_t i = made.channels - 1; i < made.pixels.size(); i += made.channels) {
-      grey.pixels.insert(grey.pixels.end(), 3, made.channels == 4 ? made.pixels[i] : std::uint8_t{255});
-    }
-    return grey;
+    if (image.is_alpha) return palette.face_alpha_image(image.texture);
+    return palette.face_image(image.texture, {image.red, image.green, image.blue});
   }
 
   // Textures' own names may not be file names.
@@ -636,9 +631,8 @@ class FaceImages {
 /// Returns a material of textured faces, or of faces with a tint only. An image has the tint.
 std::string mtl_textured(const SurfaceMaterial& material, const std::string& name, const FaceImages& images) {
   if (!material.texture) {
-    std::string colour;
-    for (int i = 0; i < 3; ++i) colour.append(" ").append(shortest(material.tint[i]));
-    return "\nnewmtl " + name + "\nKa 0 0 0\nKd" + colour + "\nKs 0 0 0\nillum 1\n";
+    const auto& [r, g, b] = std::array{material.tint.x, material.tint.y, material.tint.z};
+    return "\nnewmtl " + name + "\nKd " + shortest(r) + " " + shortest(g) + " " + shortest(b) + "\nillum 1\n";
   }
   const std::string image = images.colour_file(material);
   std::string text = "\nnewmtl " + name + "\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd " + image + "\n";
@@ -729,8 +723,8 @@ class ObjText {
 
   void write_blocks(const MeshPart& part, const VertexTransform& transform) {
     const MaterialSurfaces split(part, palette_);
-    write_face_normals(transform);
-    std::uint64_t first_inclined = kDirections.size();  // the next normal of the object
+    for (const Direction direction : kDirections) write_normal(transform.normal(Vec3(normal_of(direction))));
+    std::uint64_t first_own = kDirections.size();  // the next normal of the object
     for (const auto& [view, material] : split.surfaces()) {
       write_vertices(view, transform);
       out_.put_text("usemtl " + mtl_name(palette_, material) + "\n");
@@ -738,36 +732,29 @@ class ObjText {
       if (palette_.is_textured(material)) of_faces = palette_.face_coordinates(view);
       const std::span<const std::array<float, 2>> own = of_faces.empty() ? view.atlas : of_faces;
       for (const std::array<float, 2>& uv : own) write_texture_coordinate(uv);
-      const std::uint64_t inclined = write_inclined_normals(view, transform);
-      write_faces(view, transform.mirrors(), [&view = view, own, first_inclined, this](std::uint32_t corner) {
+      const bool has_inclined = write_inclined_normals(view, transform);
+      write_faces(view, transform.mirrors(), [&view = view, own, has_inclined, first_own, this](std::uint32_t corner) {
         QUOIN_ASSERT(corner < view.types.size() && corner < view.directions.size(), "a vertex of the surface");
         const std::uint64_t texture = own.empty() ? view.types[corner] : textures_ + corner + 1;
-        const bool is_inclined = !view.looks.empty() && view.looks[corner].normal != Vec3(0.0F);
-        return std::pair(is_inclined ? first_inclined + corner : static_cast<std::uint64_t>(view.directions[corner]),
-                         texture);
+        return std::pair(has_inclined ? first_own + corner : std::uint64_t(view.directions[corner]), texture);
       });
       vertices_ += view.positions.size();
       textures_ += own.size();
-      first_inclined += inclined;
+      if (has_inclined) first_own += view.positions.size();
     }
-    normals_ += first_inclined;
+    normals_ += first_own;
   }
 
-  /// Writes a normal per vertex if any is of an inclined face. Returns the number of normals.
-  std::uint64_t write_inclined_normals(const MeshView& view, const VertexTransform& transform) {
-    if (std::ranges::all_of(view.looks, [](const VertexLook& look) { return look.normal == Vec3(0.0F); })) return 0;
-    for (std::size_t i = 0; i < view.positions.size() && !out_.failed(); ++i) {
-      lines_.triple("vn", transform.normal(normal_at(view, i)));
-      out_.put('\n');
-    }
-    return view.positions.size();
+  /// Writes a normal per vertex and returns true if any face is inclined.
+  bool write_inclined_normals(const MeshView& view, const VertexTransform& transform) {
+    if (std::ranges::all_of(view.looks, [](const VertexLook& l) { return l.normal == Vec3(0.0F); })) return false;
+    for (std::size_t i = 0; i < view.positions.size(); ++i) write_normal(transform.normal(normal_at(view, i)));
+    return true;
   }
 
-  void write_face_normals(const VertexTransform& transform) {
-    for (const Direction direction : kDirections) {
-      lines_.triple("vn", transform.normal(Vec3(normal_of(direction))));
-      out_.put('\n');
-    }
+  void write_normal(const DVec3& normal) {
+    lines_.triple("vn", normal);
+    out_.put('\n');
   }
 
   void write_vertices(const MeshView& view, const VertexTransform& transform) {
@@ -811,10 +798,7 @@ class ObjText {
       lines_.triple("", DVec3(colour[0], colour[1], colour[2]) / 255.0, kColourDigits);
       out_.put('\n');
     }
-    for (std::size_t i = 0; i < view.normals.size() && !out_.failed(); ++i) {
-      lines_.triple("vn", transform.normal(view.normals[i]));
-      out_.put('\n');
-    }
+    for (const Vec3& normal : view.normals) write_normal(transform.normal(normal));
     write_faces(view, transform.mirrors(),
                 [](std::uint32_t corner) { return std::pair(std::uint64_t{corner}, std::uint64_t{0}); });
     vertices_ += view.positions.size();
