@@ -587,7 +587,9 @@ class FaceImages {
   void add_to(std::vector<MeshFile>& files) const {
     for (const auto& [image, path] : paths_) {
       files.push_back({path, 0, [image = image, palette = palette_](BlockWriter& out) {
-                         const auto png = encode_png(pixels_of(image, *palette));
+                         const Vec3 tint(image.red, image.green, image.blue);
+                         const auto png = encode_png(image.is_alpha ? palette->face_alpha_image(image.texture)
+                                                                    : palette->face_image(image.texture, tint));
                          if (!png) return out.fail(png.error());
                          out.put(std::span(*png));
                        }});
@@ -609,11 +611,6 @@ class FaceImages {
     return {false, *material.texture, material.tint.x, material.tint.y, material.tint.z};
   }
   static Image alpha_of(const SurfaceMaterial& material) { return {true, colour_of(material).texture}; }
-
-  static PngImage pixels_of(const Image& image, const MaterialPalette& palette) {
-    if (image.is_alpha) return palette.face_alpha_image(image.texture);
-    return palette.face_image(image.texture, {image.red, image.green, image.blue});
-  }
 
   // Textures' own names may not be file names.
   void add(const Image& image, const std::string& stem) {
