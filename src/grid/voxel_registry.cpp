@@ -22,6 +22,14 @@ std::uint64_t hash_of(const VoxelProperties& p) {
                                (std::uint64_t{p.colour.b} << 8) | p.colour.a;
   std::uint64_t hash =
       std::hash<std::string>{}(p.name) * 0x9E37'79B9'7F4A'7C15U + colour * 4 + static_cast<std::uint64_t>(p.visibility);
+  // Types of one name and colour often differ in their shapes alone. Adding 0 makes -0 and 0 equal.
+  for (std::size_t part = 0; !p.shapes.empty() && part < p.shapes.rules().parts.size(); ++part) {
+    for (const ShapeElement& element : p.shapes.rules().parts[part].shape.elements()) {
+      const auto bits = [](float value) { return std::bit_cast<std::uint32_t>(value + 0.0F); };
+      const auto pair = [&](float low, float high) { return std::uint64_t{bits(low)} << 32 | bits(high); };
+      for (int axis = 0; axis < 3; ++axis) hash = mixed_with(hash, pair(element.min[axis], element.max[axis]));
+    }
+  }
   if (p.faces.empty()) return hash;
   // Types of one name and mean colour often differ in their faces alone.
   for (const Direction direction : kDirections) {

@@ -184,29 +184,34 @@ Result<const FormatDriver*> driver_for_saving(const std::filesystem::path& path)
   return &driver_of(format->format);
 }
 
-/// Returns the number of types with textures that voxels or samples of the scene have.
-std::size_t textured_types(const Scene& scene) {
-  std::set<VoxelType> textured;
+/// Returns the number of types that voxels or samples of the scene have and that `counts` accepts.
+std::size_t used_types(const Scene& scene, FunctionRef<bool(const VoxelProperties& type)> counts) {
+  std::set<VoxelType> used;
   const auto add = [&](const std::vector<VoxelType>& types) {
     for (const VoxelType type : types) {
-      if (type < scene.types.size() && !scene.types[type].faces.empty()) textured.insert(type);
+      if (type != kAir && type < scene.types.size() && counts(scene.types[type])) used.insert(type);
     }
   };
-  if (!scene.types.has_textures()) return 0;
   scene.grids().for_each([&](GridHandle /*handle*/, const SceneGrid& grid) {
     add(grid.grid.types());
     for (const IVec3 chunk : grid.field.chunks()) add(grid.field.find_chunk(chunk)->materials().types());
   });
-  return textured.size();
+  return used.size();
 }
 
-/// Adds warnings of textures, and of the loaded file's data, that the saved file lacks.
+/// Adds warnings of textures and shapes, and of the loaded file's data, that the saved file lacks.
 void add_lost_data(const FormatDriver& driver, const FormatOutput& output, const std::filesystem::path& path,
                    std::vector<std::string>& warnings) {
-  const std::size_t textured = driver.info.can(FormatCapability::Faces) ? 0 : textured_types(output.scene);
-  if (textured > 0) {
-    warnings.push_back("textures of types left out, their mean colours are kept: " + std::to_string(textured));
-  }
+  const VoxelRegistry& types = output.scene.types;
+  const auto add = [&](const char* lost, bool has_any, FunctionRef<bool(const VoxelProperties& type)> counts) {
+    const bool is_kept = !has_any || driver.info.can(FormatCapability::Faces);
+    const std::size_t count = is_kept ? 0 : used_types(output.scene, counts);
+    if (count > 0) warnings.push_back(lost + std::to_string(count));
+  };
+  add("textures of types left out, their mean colours are kept: ", types.has_textures(),
+      [](const VoxelProperties& type) { return !type.faces.empty(); });
+  add("shapes of types left out, their voxels are cubes: ", types.has_shapes(),
+      [](const VoxelProperties& type) { return !type.shapes.empty(); });
   if (driver.reports_loaded_data) return;
   std::ranges::move(lost_with_source(output), std::back_inserter(warnings));
   std::ranges::move(lost_views(output, driver.info, path), std::back_inserter(warnings));

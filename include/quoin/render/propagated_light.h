@@ -87,7 +87,8 @@ class PropagatedLight {
   ~PropagatedLight();
 
   /// Applies the edits since the last update, and changes of data if types have shapes. Recomputes everything for
-  /// another grid, or when the transparency, shapes, light properties or emission of types changed. If it throws (bad_alloc), the next update starts from scratch.
+  /// another grid, or when the transparency, shapes, light properties or emission of types changed.
+  /// If it throws (bad_alloc), the next update starts from scratch.
   void update(const Grid& grid, const VoxelRegistry& types, Threads threads = {});
 
   /// Returns a copy of the current light. The two are independent. A cursor of one is also valid in the other until the

@@ -14,7 +14,8 @@
 namespace [[gnu::visibility("default")]] quoin {
 
 // Collision shapes of solid voxels for physics engines. Types that collide (VoxelProperties::collides) and unregistered
-// types are solid. Voxels whose type has shapes (VoxelProperties::shapes) consist of the boxes of their shape. Boxes have an inside, so fast bodies do not tunnel through them. Triangles do not, so fast bodies
+// types are solid. Voxels whose type has shapes (VoxelProperties::shapes) consist of the boxes of their shape.
+// Boxes have an inside, so fast bodies do not tunnel through them. Triangles do not, so fast bodies
 // need the engine's continuous collision detection.
 
 /// Triangles in the layout of physics engines. `positions` has three floats per vertex (Jolt's Float3, Bullet's vertex

@@ -411,12 +411,13 @@ TEST(SceneData, RefusesInvalidReferencesToTextures) {
   EXPECT_EQ(error_of(R"({"type":2,"texture":0,"size":64})"), place + ": \"size\" is unknown here");
 }
 
-TEST(SceneData, NamesTexturesThatAFormatLacks) {
+TEST(SceneData, NamesTexturesAndShapesThatAFormatLacks) {
   Scene scene = scene_of(Grid());
   ASSERT_TRUE(scene.types.add({.name = "wall", .faces = random_texture("wall", 16, 3, false)}));
   ASSERT_TRUE(scene.types.add({.name = "unused", .faces = random_texture("roof", 16, 4, false)}));
   Grid grid;
   grid.set({0, 0, 0}, 3);
+  grid.set({1, 0, 0}, *scene.types.add({.name = "slab", .shapes = VoxelShape::box({0, 0, 0}, {16, 8, 16})}));
   const GridHandle handle = scene.add_grid({.grid = std::move(grid)});
   scene.add_instance({.grid = handle});
   const TestFolder folder("scene_textures");
@@ -424,6 +425,7 @@ TEST(SceneData, NamesTexturesThatAFormatLacks) {
   for (const char* name : {"a.vox", "a.qb"}) {
     const auto warnings = unsupported_features(scene, folder.file(name)).value();
     EXPECT_EQ(std::ranges::count(warnings, line), 1) << name;
+    EXPECT_EQ(std::ranges::count(warnings, "shapes of types left out, their voxels are cubes: 1"), 1) << name;
     const auto saved = save_scene(scene, folder.file(name));
     ASSERT_TRUE(saved) << to_string(saved.error());
     EXPECT_EQ(std::ranges::count(saved->warnings, line), 1) << name;
@@ -478,6 +480,8 @@ VoxelProperties shaped_type() {
   type.name = "pane";
   type.state_bits = 5;
   type.orientations = StateOrientations::to_directions(2);
+  type.orientations.front = Direction::NegZ;
+  type.field_textures = {.voxels = 4.0F, .flat_degrees = 20.0F, .steep_degrees = 30.5F};
   const Texture knob = random_texture("knob", 16, 7, false);
   ShapeElement tilted{.min = Vec3(-15.5F, 0.1F, 3.0F), .max = Vec3(32.0F, 1.0F / 3.0F, 3.0F), .collides = false};
   tilted.turn = ElementTurn{.origin = Vec3(1.0F, 2.5F, -3.0F), .axis = 2, .degrees = 22.5F, .rescales = true};
@@ -500,11 +504,8 @@ TEST(SceneData, KeepsOrientationsAndShapes) {
   Scene scene = scene_of(Grid());
   ASSERT_TRUE(scene.types.add(textured_type()));
   ASSERT_TRUE(scene.types.add(shaped_type()));
-  VoxelProperties log{.name = "log", .state_bits = 2, .blocks_light = false};
-  log.orientations = StateOrientations::along_axes();
-  log.orientations.front = Direction::NegZ;
-  log.field_textures = {.voxels = 2.5F, .flat_degrees = 20.0F, .steep_degrees = 41.0F};
-  ASSERT_TRUE(scene.types.add(log));
+  ASSERT_TRUE(scene.types.add(
+      {.name = "log", .state_bits = 2, .blocks_light = false, .orientations = StateOrientations::along_axes()}));
   ASSERT_TRUE(scene.types.add({.name = "water",
                                .visibility = Visibility::Transparent,
                                .state_bits = 4,
@@ -564,8 +565,7 @@ TEST(SceneData, RefusesInvalidShapesWithTheirPosition) {
   EXPECT_EQ(
       error_with("\"inner_left\"", "\"left\""),
       shapes + ".parts[1].when[1].corner: must be one of straight, outer_left, outer_right, inner_left, inner_right");
-  EXPECT_EQ(error_with("\"degrees\":22.5", "\"degrees\":1e300"),
-            shapes + ".parts[1].elements: cannot use element 1 of a shape: the turn is not finite");
+  EXPECT_EQ(error_with("\"degrees\":22.5", "\"degrees\":1e300"), element + ".turn.degrees: is too large");
   EXPECT_EQ(error_with("\"axis\":2", "\"axis\":3"), element + ".turn.axis: must be a whole number from 0 to 2");
   EXPECT_EQ(error_with("[-15.5,", "[-17,"), shapes +
                                                 ".parts[1].elements: cannot use element 1 of a shape: a corner is "
@@ -576,6 +576,11 @@ TEST(SceneData, RefusesInvalidShapesWithTheirPosition) {
   EXPECT_EQ(error_with("\"elements\"", "\"boxes\""), shapes + ".parts[0]: \"boxes\" is unknown here");
   EXPECT_EQ(error_with("\"by_value\":[", "\"by_value\":[99,"),
             "types[0].orientations.by_value[0]: must be the number of an orientation, 0 to 47");
+  EXPECT_EQ(error_with("\"front\":\"-Z\"", "\"front\":2"),
+            "types[0].orientations.front: must be one of +X, -X, +Y, -Y, +Z, -Z");
+  EXPECT_EQ(
+      error_with("\"steep_degrees\":30.5", "\"steep_degrees\":10"),
+      shapes + ": cannot use voxel type \"pane\": field_textures: slopes must be 0 <= flat < steep <= 90 degrees");
   EXPECT_EQ(error_with("\"state_bits\":5", "\"state_bits\":2"),
             shapes +
                 ": cannot use voxel type \"pane\": orientations: they use bits of the state that `state_bits` does "

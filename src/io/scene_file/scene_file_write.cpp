@@ -39,7 +39,7 @@ class SceneText {
             properties.blocks_light || properties.occludes || properties.light_cost != 0 || properties.remesh_on_data;
         is_eighth_ |= !properties.faces.empty();
         is_ninth_ |= !properties.orientations.empty() || !properties.shapes.empty() ||
-                     properties.field_textures != FieldTextures{};
+                     !(properties.field_textures == FieldTextures{});
       }
       for (std::size_t i = 0; i < scene.grids.size(); ++i) {
         put_grid(scene.grids[i], pieces.voxels[i], pieces.densities[i], pieces.data[i]);

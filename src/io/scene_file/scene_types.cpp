@@ -119,7 +119,7 @@ OrderedJson json_of(const ShapeCondition& condition) {
 OrderedJson json_of(const StateOrientations& orientations) {
   OrderedJson json = OrderedJson::object();
   if (orientations.first_bit != 0) json["first_bit"] = orientations.first_bit;
-  if (orientations.front != StateOrientations{}.front) json["front"] = name_of(orientations.front);
+  if (orientations.front != Direction::PosX) json["front"] = name_of(orientations.front);
   for (const AxisOrientation& orientation : orientations.by_value) json["by_value"].push_back(orientation.index());
   return json;
 }
@@ -170,10 +170,11 @@ OrderedJson PartWriter::json_of(const VoxelProperties& type) {
   if (type.remesh_on_data) json["remesh_on_data"] = true;
   TypeTextures textures;
   if (!type.faces.empty()) json["faces"] = json_of(type.faces, textures);
-  if (type.field_textures != plain.field_textures) {
-    json["field_textures"] = {{"voxels", type.field_textures.voxels},
-                              {"flat_degrees", type.field_textures.flat_degrees},
-                              {"steep_degrees", type.field_textures.steep_degrees}};
+  if (!(type.field_textures == plain.field_textures)) {
+    OrderedJson& field = json["field_textures"];
+    field["voxels"] = type.field_textures.voxels;
+    field["flat_degrees"] = type.field_textures.flat_degrees;
+    field["steep_degrees"] = type.field_textures.steep_degrees;
   }
   if (!type.orientations.empty()) json["orientations"] = scene_json::json_of(type.orientations);
   if (!type.shapes.empty()) json["shapes"] = json_of(type.shapes, textures);
@@ -421,12 +422,13 @@ void read_looks(const Object& type, TexturesOfTypes& earlier, VoxelProperties& p
     last = "faces";
     properties.faces = faces_of(*faces, type.place_of("faces"), earlier, textures, faults);
   }
-  if (const Json* field = type.find("field_textures")) {
+  if (const Json* json = type.find("field_textures")) {
     last = "field_textures";
-    const Object object(*field, type.place_of("field_textures"), {"voxels", "flat_degrees", "steep_degrees"}, faults);
-    object.read("voxels", properties.field_textures.voxels);
-    object.read("flat_degrees", properties.field_textures.flat_degrees);
-    object.read("steep_degrees", properties.field_textures.steep_degrees);
+    const Place place = type.place_of("field_textures");
+    const Object field(*json, place, {"voxels", "flat_degrees", "steep_degrees"}, faults);
+    field.read("voxels", properties.field_textures.voxels);
+    field.read("flat_degrees", properties.field_textures.flat_degrees);
+    field.read("steep_degrees", properties.field_textures.steep_degrees);
   }
   if (const Json* orientations = type.find("orientations")) {
     last = "orientations";
@@ -439,7 +441,6 @@ void read_looks(const Object& type, TexturesOfTypes& earlier, VoxelProperties& p
   earlier.push_back(std::move(textures));
   if (faults.error()) {
     properties.faces = {};
-    properties.field_textures = {};
     properties.orientations = {};
     properties.shapes = {};
   } else if (const Status valid = validate_type(properties); last && !valid) {

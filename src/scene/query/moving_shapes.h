@@ -214,8 +214,8 @@ LineGap gap_of_line(const DVec3& middle, const DVec3& half_axis, const Half& hal
   return {distance, distance > 0.0 ? offset / distance : DVec3(0.0)};
 }
 
-/// Returns the shortest way out of a voxel, or a box of the grid, (centred at the origin) for a line that intersects it,
-/// with a negative distance.
+/// Returns the shortest way out of a voxel, or a box of the grid, (centred at the origin) for a line that intersects
+/// it, with a negative distance.
 template <class Half = HalfVoxel>
 LineGap way_out_of_line(const DVec3& middle, const DVec3& half_axis, const Half& half = {}) {
   LineGap best{-std::numeric_limits<double>::infinity(), {}};

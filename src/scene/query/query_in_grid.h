@@ -111,7 +111,8 @@ class ShapeObstacles {
   [[nodiscard]] bool is_cube_met(VoxelType type) const {
     return types_.holds(type) && !types_.registry().is_shaped(type);
   }
-  /// Calls `visit(voxel, box)` for each box that the query meets of the shapes that touch a cell. `voxel`: of the shape.
+  /// Calls `visit(voxel, box)` for each box that the query meets of the shapes that touch a cell. `voxel`: of the
+  /// shape.
   template <class Visit>
   void visit(IVec3 cell, const Visit& visit) const {
     for (const PlacedShape& shape : shapes_.index.at(cell)) {

@@ -95,19 +95,22 @@ TEST(Migration, UpgradesWhenOpenedForWriting) {
   EXPECT_FALSE(std::filesystem::exists(path.string() + "~"));  // steps that only add keep no copy
 }
 
-// Programs of version 4 cannot read types with textures, and report them as damage unless the version is later.
-TEST(Migration, MarksWorldsThatMayHaveTextures) {
-  const WorldFolder folder;
-  const auto path = folder / "w.quoin";
-  make_world(path);
-  {
-    Connection database = write(path);
-    set_version(database, 4);
-    ASSERT_TRUE(database.close());
+// Programs of version 4 cannot read types with textures, and those of version 5 no types with shapes. They report them
+// as damage unless the version is later.
+TEST(Migration, MarksWorldsThatMayHaveTexturesOrShapes) {
+  for (const int version : {4, 5}) {
+    const WorldFolder folder;
+    const auto path = folder / "w.quoin";
+    make_world(path);
+    {
+      Connection database = write(path);
+      set_version(database, version);
+      ASSERT_TRUE(database.close());
+    }
+    ASSERT_TRUE(WorldStore::open(path, WorldAccess::Write));
+    EXPECT_EQ(version_of(path), 6);
+    EXPECT_EQ(sound_chunks(path), std::size_t{kChunks});
   }
-  ASSERT_TRUE(WorldStore::open(path, WorldAccess::Write));
-  EXPECT_EQ(version_of(path), 5);
-  EXPECT_EQ(sound_chunks(path), std::size_t{kChunks});
 }
 
 TEST(Migration, ListsKeysWithoutReadingBodies) {

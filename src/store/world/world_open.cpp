@@ -160,8 +160,8 @@ Status add_key_index(Connection& database) {
 
 // Version 3 has environment parts, which earlier programs would ignore. Version 4 has whole grids, and types with light
 // and occlusion of their own, which they would refuse as damaged. Without the mark a grid is streamed, as all were
-// before. Version 5 has types with textures, version 6 types with orientations, shapes and textures
-// for fields.
+// before. Version 5 has types with textures, version 6 types with orientations, shapes and
+// textures of fields.
 Status add_nothing(Connection& /*database*/) {
   return {};
 }

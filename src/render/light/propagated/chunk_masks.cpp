@@ -86,6 +86,32 @@ void set_passage(const VoxelRegistry& types, VoxelType type, unsigned colours, T
       types.is_shaped(type) && properties.visibility == Visibility::Opaque && !properties.blocks_light.has_value();
 }
 
+std::vector<TypeLight> type_lights(const VoxelRegistry& types, const PropagatedLightOptions& options) {
+  std::vector<TypeLight> lights(types.size());
+  for (std::size_t i = 1; i < lights.size(); ++i) {
+    const auto type = static_cast<VoxelType>(i);
+    const VoxelProperties& properties = types[type];
+    LightLevels lamp = options.lamp ? options.lamp(type, properties) : lamp_levels(properties);
+    lamp.sky = 0;
+    for (std::uint8_t* level : {&lamp.red, &lamp.green, &lamp.blue}) {
+      *level = static_cast<std::uint8_t>(std::min<unsigned>(*level, 15U));
+    }
+    lights[i].lamp = packed(lamp);
+    const Rgba8 colour = properties.colour;
+    const int half = (std::max({colour.r, colour.g, colour.b}) + 1) / 2;
+    const int tinted = 1 | (colour.r >= half) << 1 | (colour.g >= half) << 2 | (colour.b >= half) << 3;
+    // Light passes an opaque type where the type leaves room, not through its material.
+    const bool is_clear = properties.visibility == Visibility::Transparent;  // the material of shapes
+    const unsigned colours = is_clear ? static_cast<unsigned>(tinted) : (1U << kChannels) - 1;
+    set_passage(types, type, colours, lights[i]);
+  }
+  return lights;
+}
+
+bool has_sides(const std::vector<TypeLight>& lights) {
+  return std::ranges::any_of(lights, &TypeLight::has_sides);
+}
+
 namespace {
 
 // Reads the rows of a box that hold types that `counts` accepts; [y + 64 z]. `inverted`: or all others.

@@ -43,6 +43,11 @@ struct TypeLight {
 /// Sets how light passes a type. `colours`: bit c: the type's colour lets channel c through, which holds for the sky.
 void set_passage(const VoxelRegistry& types, VoxelType type, unsigned colours, TypeLight& light);
 
+/// Returns the light properties of all types, by id.
+[[nodiscard]] std::vector<TypeLight> type_lights(const VoxelRegistry& types, const PropagatedLightOptions& options);
+/// Returns true if the shapes of any type may cover sides.
+[[nodiscard]] bool has_sides(const std::vector<TypeLight>& lights);
+
 /// Returns true if light of a channel passes voxels of a type as it passes air.
 [[nodiscard]] inline bool passes(const std::vector<TypeLight>& types, VoxelType type, std::size_t channel) {
   return type == kAir || (light_of(types, type).passes >> channel & 1U) != 0;
@@ -76,8 +81,8 @@ using ColumnSet = std::array<std::uint64_t, kChunkEdge>;
   return std::any_of(columns.begin(), columns.end(), [](std::uint64_t row) { return row != 0; });
 }
 
-/// Lets sky columns fall from row `end` to row `begin` of a chunk, and out of it. Removes the columns that stop. Returns
-/// the lowest row reached, or `end` if there is none. `voxels`: null if all is air. `sides`: of the chunk.
+/// Lets sky columns fall from row `end` to row `begin` of a chunk, and out of it. Removes the columns that stop.
+/// Returns the lowest row reached, or `end` if there is none. `voxels`: null if all is air. `sides`: of the chunk.
 /// Cost: O(rows of 64 voxels until all columns stop); O(types) if none stops sky light.
 int fall(const Chunk* voxels, const std::vector<TypeLight>& types, const CoveredSides& sides, int begin, int end,
          ColumnSet& open);

@@ -37,6 +37,7 @@ using propagated::ChunkMasks;
 using propagated::ColumnSet;
 using propagated::CoveredSides;
 using propagated::fall;
+using propagated::has_sides;
 using propagated::is_any;
 using propagated::kAllChannels;
 using propagated::kChannels;
@@ -52,36 +53,11 @@ using propagated::LightSlab;
 using propagated::LightSolver;
 using propagated::LightStore;
 using propagated::rows_of;
+using propagated::type_lights;
 using propagated::TypeLight;
 
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr unsigned kBrightest = 15;
-
-std::vector<TypeLight> type_lights(const VoxelRegistry& types, const PropagatedLightOptions& options) {
-  std::vector<TypeLight> lights(types.size());
-  for (std::size_t i = 1; i < lights.size(); ++i) {
-    const auto type = static_cast<VoxelType>(i);
-    const VoxelProperties& properties = types[type];
-    LightLevels lamp = options.lamp ? options.lamp(type, properties) : propagated::lamp_levels(properties);
-    lamp.sky = 0;
-    for (std::uint8_t* level : {&lamp.red, &lamp.green, &lamp.blue}) {
-      *level = static_cast<std::uint8_t>(std::min<unsigned>(*level, kBrightest));
-    }
-    lights[i].lamp = packed(lamp);
-    const Rgba8 colour = properties.colour;
-    const int half = (std::max({colour.r, colour.g, colour.b}) + 1) / 2;
-    const int tinted = 1 | (colour.r >= half) << 1 | (colour.g >= half) << 2 | (colour.b >= half) << 3;
-    // Light passes an opaque type where the type leaves room, not through its material.
-    const bool is_clear = properties.visibility == Visibility::Transparent;  // the material of shapes
-    const unsigned colours = is_clear ? static_cast<unsigned>(tinted) : propagated::kAllChannels;
-    propagated::set_passage(types, type, colours, lights[i]);
-  }
-  return lights;
-}
-
-bool has_sides(const std::vector<TypeLight>& lights) {
-  return std::ranges::any_of(lights, &TypeLight::has_sides);
-}
 
 // Returns the number of voxels around a region whose types the solver needs: it skips light that does not leave them,
 // or not on the side of the region.

@@ -22,8 +22,8 @@ struct LevelPass {
   unsigned level;  ///< the level that this step assigns
   std::size_t layer;
   std::size_t column;
-  std::size_t layers;                  ///< with the first and the last, which belong to the rim and receive no light
-  const std::uint64_t* pass;           ///< voxels that light passes; 0 at the region's rim
+  std::size_t layers;         ///< with the first and the last, which belong to the rim and receive no light
+  const std::uint64_t* pass;  ///< voxels that light passes; 0 at the region's rim
   /// By axis: voxels with an open side towards the next lower voxel of the axis, and one more word. Null: all are open.
   const std::uint64_t* open_sides[3];
   std::uint64_t* rest;                 ///< the dark voxels of `pass`, valid in touched blocks
