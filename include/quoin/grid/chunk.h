@@ -217,8 +217,8 @@ struct Neighbourhood {
   }
 };
 
-/// Returns the shape of the voxel at a position relative to the centre chunk, as state and neighbours select it; null if
-/// its type has no shapes. Lifetime: until the type is replaced. Requires: -63 <= local.x, local.y, local.z < 127.
+/// Returns the shape of the voxel at a position relative to the centre chunk, as state and neighbours select it; null
+/// if its type has no shapes. Lifetime: until the type is replaced. Requires: -63 <= local.x, local.y, local.z < 127.
 [[nodiscard]] const ShapeModel* shape_at(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 local);
 
 /// Returns a neighbourhood of a chunk without neighbours. Lifetime: same as Neighbourhood.

@@ -219,9 +219,10 @@ struct ModelFace {
   /// True if sixteenths of the same model fill the whole space in front of the face, so that it cannot be seen.
   bool is_inner = false;
   SideMask mask{};  ///< for faces on a side: the squares that it touches
-  /// The eighths of voxels that darken each corner, in the order of `vertex_occlusion`: side, side, diagonal. They touch
-  /// the corner, moved to the nearest half of a voxel, in front of the face. A number is 8 (x + 3 y + 9 z) + the bit of
-  /// ShapeModel::filled_octants, for the voxel at (x, y, z) - 1 from the own one. kNoOccluder: of inclined faces.
+  /// The eighths of voxels that darken each corner, in the order of `vertex_occlusion`: side, side, diagonal. They
+  /// touch the corner, moved to the nearest half of a voxel, in front of the face. A number is 8 (x + 3 y + 9 z) + the
+  /// bit of ShapeModel::filled_octants, for the voxel at (x, y, z) - 1 from the own one. kNoOccluder: of inclined
+  /// faces.
   std::array<std::array<std::uint8_t, 3>, 4> occluders{};
 };
 

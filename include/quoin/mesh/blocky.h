@@ -186,10 +186,10 @@ inline constexpr float kSheetOffset = 0.01F;
 [[nodiscard]] Result<BlockyTriangles> closed_surface(const Grid& grid, const Progress& progress = {});
 
 /// As above, with the shapes of types: the surface of the union of all cubes and of the sixteenths of a voxel whose
-/// centres lie in a box of a shape, also outside of its voxel. Without shapes, the result is that of the other function.
+/// centres lie in a box of a shape, also outside of its voxel. Without shapes, both functions return the same.
 ///
-/// Shapes:    their faces, and those of cubes next to them, consist of squares of a sixteenth of a voxel. Faces of cubes
-///            that only touch shapes at an edge get more outline vertices.
+/// Shapes:    their faces, and those of cubes next to them, consist of squares of a sixteenth of a voxel. Faces of
+///            cubes that only touch shapes at an edge get more outline vertices.
 /// Left out:  plates without thickness, such as plants. If `flat_shapes` is not null, it receives the number of voxels
 ///            that have some.
 /// Cost:      about a microsecond per square of a sixteenth, on one thread, and 4 KiB per two shaped voxels.

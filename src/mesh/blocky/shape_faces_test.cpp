@@ -134,12 +134,12 @@ FaceSet cube_faces(const Grid& grid, const VoxelRegistry& types, bool occlusion)
   return faces;
 }
 
-// Returns true if boxes of the model fill the space in front of a face: at 40 x 40 points of it.
+// Returns true if boxes of the model fill the space in front of a face: at 16 x 16 points of it.
 bool is_behind_own_boxes(const ShapeModel& model, const ModelFace& face) {
   const Vec3 out = Vec3(normal_of(face.direction)) / 64.0F;
-  for (int i = 0; i < 40 * 40; ++i) {
-    const float u = (static_cast<float>(i % 40) + 0.5F) / 40.0F;
-    const float v = (static_cast<float>(i / 40) + 0.5F) / 40.0F;
+  for (int i = 0; i < 16 * 16; ++i) {
+    const float u = (static_cast<float>(i % 16) + 0.5F) / 16.0F;
+    const float v = (static_cast<float>(i / 16) + 0.5F) / 16.0F;
     const Vec3 at =
         face.corners[0] + u * (face.corners[1] - face.corners[0]) + v * (face.corners[3] - face.corners[0]) + out;
     const IVec3 cell(glm::floor(at * 16.0F));
