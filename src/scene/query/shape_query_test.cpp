@@ -119,7 +119,7 @@ PlainHit nearest_of(const std::vector<PlainSolid>& solids, const Ray& ray, bool 
   return best;
 }
 
-Scene random_scene(Random& random) {
+Scene random_shapes(Random& random) {
   Scene scene;
   const ShapeTypes types(scene.types);
   const std::vector<VoxelType> all = {types.stone,  types.slab, types.stairs, types.fence, types.torch,
@@ -158,7 +158,7 @@ Ray ray_of(int i, Random& random) {
 TEST(ShapeQuery, RaysHitNearestPartOfAnyShape) {
   for (unsigned seed = 0; seed < 6; ++seed) {
     Random random(seed);
-    const Scene scene = random_scene(random);
+    const Scene scene = random_shapes(random);
     const SceneTracer tracer(scene);
     const std::vector<PlainSolid> solids = all_solids(scene);
     int hits = 0;

@@ -305,9 +305,9 @@ TEST(PropagatedLight, StopsAtCoveredSidesAfterRandomEdits) {
         const auto type =
             static_cast<VoxelType>(step == 0 || below(2) == 0 ? below(static_cast<int>(types.size())) : 0);
         if (step > 0 && below(3) > 0) {
-          grid.set_data(at, {.state = random() % 8});
+          grid.set_data(at, {.state = static_cast<std::uint32_t>(below(8))});
         } else {
-          grid.set(at, type, {.state = random() % 8});
+          grid.set(at, type, {.state = static_cast<std::uint32_t>(below(8))});
         }
       }
       light.update(grid, types, {1 + seed % 2});
