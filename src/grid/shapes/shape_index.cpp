@@ -43,7 +43,7 @@ class SurroundingsFinder {
         around.corner = corner(voxel, rules, orientation);
         break;
       case ShapeNeighbours::Fluid:
-        around.heights = heights(voxel, type, state);
+        around.heights = heights(voxel, type);
         break;
     }
     return &properties.shapes.model(state, orientation, around);
@@ -116,12 +116,11 @@ class SurroundingsFinder {
     if (voxels_.get(voxel) != fluid) return std::nullopt;
     if (voxels_.get(voxel + IVec3(0, 1, 0)) == fluid) return 9;
     const std::uint32_t state = types_[fluid].state_bits == 0 ? 0 : voxels_.state(voxel);
-    return (state & 8U) != 0 ? 8 : 8 - static_cast<int>(state & 7U);
+    return (state & 8U) != 0 ? 9 : 8 - static_cast<int>(state & 7U);
   }
 
-  [[nodiscard]] std::array<std::uint8_t, 4> heights(IVec3 voxel, VoxelType fluid, std::uint32_t state) const {
-    const int own = voxels_.get(voxel + IVec3(0, 1, 0)) == fluid ? 9 : *ninths(voxel, fluid);
-    if (own == 9 || (state & 8U) != 0) return {16, 16, 16, 16};
+  [[nodiscard]] std::array<std::uint8_t, 4> heights(IVec3 voxel, VoxelType fluid) const {
+    if (ninths(voxel, fluid) == 9) return {16, 16, 16, 16};
     std::array<std::uint8_t, 4> result{};
     constexpr std::array<std::array<int, 2>, 4> kCorners = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
     for (std::size_t i = 0; i < 4; ++i) result[i] = height_at(voxel + IVec3(kCorners[i][0], 0, kCorners[i][1]), fluid);

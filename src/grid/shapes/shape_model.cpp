@@ -139,7 +139,13 @@ std::uint8_t octant_number(const IVec3& half) {
 // Fills ModelFace::occluders of a face along the axes.
 void find_occluders(ModelFace& face) {
   const FaceFrame& frame = frame_of(face.direction);
-  const Vec3 middle = (face.corners[0] + face.corners[2]) * 0.5F;
+  Vec3 lower = face.corners[0];
+  Vec3 upper = face.corners[0];
+  for (const Vec3& corner : face.corners) {
+    lower = glm::min(lower, corner);
+    upper = glm::max(upper, corner);
+  }
+  const Vec3 middle = (lower + upper) * 0.5F;
   for (std::size_t i = 0; i < 4; ++i) {
     IVec3 corner;
     for (int axis = 0; axis < 3; ++axis) {
@@ -225,7 +231,9 @@ class ModelBuilder {
     for (std::size_t i = 0; i < 4; ++i) {
       const std::size_t next = (i + 1) % 4;
       if (heights[i] == 0 && heights[next] == 0) continue;
-      add_free({bottom(next), bottom(i), top[i], top[next]}, kSides[i]);
+      // A triangle where a corner of the surface is at the bottom.
+      const Vec3& third = heights[i] == 0 ? top[next] : top[i];
+      add_free({bottom(next), bottom(i), third, heights[next] == 0 ? third : top[next]}, kSides[i]);
     }
     for (int z = 0; z < kShapeUnits; ++z) {
       for (int x = 0; x < kShapeUnits; ++x) {

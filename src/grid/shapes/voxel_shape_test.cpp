@@ -123,6 +123,12 @@ TEST(VoxelShape, RejectsBadElementsByIndex) {
   EXPECT_EQ(reason({.min = Vec3(9.0F), .max = Vec3(8.0F)}),
             "cannot use element 1 of a shape: the upper corner is below the lower one");
   EXPECT_EQ(reason({.turn = ElementTurn{.degrees = nan}}), "cannot use element 1 of a shape: the turn is not finite");
+  // No consumer looks for shapes farther than a voxel away.
+  EXPECT_EQ(reason({.min = Vec3(-16.0F), .max = Vec3(32.0F), .turn = ElementTurn{.degrees = 45.0F}}),
+            "cannot use element 1 of a shape: the turn moves a corner outside -16 to 32 sixteenths");
+  EXPECT_EQ(reason({.turn = ElementTurn{.origin = Vec3(1e6F), .degrees = 180.0F}}),
+            "cannot use element 1 of a shape: the origin of the turn is beyond 1,024 sixteenths");
+  EXPECT_EQ(reason({.min = Vec3(-16.0F), .max = Vec3(32.0F), .turn = ElementTurn{.degrees = 90.0F}}), "");
   EXPECT_FALSE(VoxelShape::from_elements(std::vector<ShapeElement>(200)));
   EXPECT_FALSE(VoxelShape::from_elements({}));
   EXPECT_FALSE(VoxelShapes::from_rules({}));
@@ -228,6 +234,40 @@ TEST(ShapeAt, FluidsInclineTowardsLowerNeighbours) {
   EXPECT_GT(height(*source, 1, 0), height(*next, 1, 0));
   grid.set({1, 1, 0}, water);
   EXPECT_TRUE(shape_at(grid, types, {1, 0, 0})->is_full);
+}
+
+TEST(ShapeAt, SurfacesOfFluidsFaceOutwardForAllHeights) {
+  const VoxelShapes fluid = *VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid});
+  constexpr std::array<std::uint8_t, 3> kHeights = {0, 5, 16};
+  for (int i = 0; i < 81; ++i) {
+    const auto height = [&](int digit) { return kHeights[static_cast<std::size_t>(digit % 3)]; };
+    ShapeSurroundings around;
+    around.heights = {height(i), height(i / 3), height(i / 9), height(i / 27)};
+    const ShapeModel& model = fluid.model(0, {}, around);
+    for (std::size_t f = model.faces.size() - model.free_faces; f < model.faces.size(); ++f) {
+      const ModelFace& face = model.faces[f];
+      const Vec3 area = glm::cross(face.corners[1] - face.corners[0], face.corners[2] - face.corners[0]);
+      EXPECT_GT(glm::dot(area, face.normal), 0.0F) << "heights " << i << ", face " << f;
+      const FaceFrame& frame = frame_of(face.direction);
+      if (face.normal.y != 0.0F) continue;
+      EXPECT_TRUE(face.on_side) << "heights " << i << ", face " << f;
+      for (const Vec3& corner : face.corners) EXPECT_EQ(corner[frame.axis], frame.sign > 0 ? 1.0F : 0.0F);
+    }
+  }
+}
+
+TEST(ShapeAt, FallingFluidsMeetTheirNeighboursAtEqualHeights) {
+  VoxelRegistry types;
+  const VoxelType water = *types.add({.name = "water",
+                                      .visibility = Visibility::Transparent,
+                                      .state_bits = 4,
+                                      .shapes = *VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid})});
+  Grid grid;
+  grid.set({0, 0, 0}, water, {.state = 8});
+  grid.set({1, 0, 0}, water);
+  EXPECT_TRUE(shape_at(grid, types, {0, 0, 0})->is_full);
+  // The faces between the two are hidden, so that a step between them would be a hole.
+  EXPECT_EQ(shape_at(grid, types, {1, 0, 0})->max.y, 1.0F);
 }
 
 TEST(ShapeIndex, ListsShapesInVoxelsThatTheyTouchAndFollowsEdits) {
