@@ -20,7 +20,8 @@ namespace [[gnu::visibility("default")]] quoin {
 
 /// Number of units per voxel in which shapes are described: a voxel spans 0 to 16 on each axis.
 inline constexpr int kShapeUnits = 16;
-/// Range of an element's corners, in sixteenths: an element may reach one voxel outside its own.
+/// Range of an element's corners, in sixteenths, before and after its turn: an element may reach one voxel outside its
+/// own.
 inline constexpr int kMinShapeUnit = -16;
 inline constexpr int kMaxShapeUnit = 32;
 /// Maximum number of elements of a shape.
@@ -75,8 +76,9 @@ class VoxelShape {
   /// Makes a shape from its elements.
   ///
   /// Errors: InvalidArgument if there are no or more than kMaxShapeElements elements, a corner is not finite or outside
-  ///         kMinShapeUnit to kMaxShapeUnit, an upper corner is below the lower one, an element has no extent along two
-  ///         axes, or a turn, its axis or a part of a texture is not finite. The message names the element's index.
+  ///         kMinShapeUnit to kMaxShapeUnit, also after the element's turn, an upper corner is below the lower one, an
+  ///         element has no extent along two axes, a turn, its axis or a part of a texture is not finite, or the origin
+  ///         of a turn is farther than 1,024 sixteenths away. The message names the element's index.
   [[nodiscard]] static Result<VoxelShape> from_elements(std::vector<ShapeElement> elements);
   /// Makes a box, in sixteenths. Requires: 0 <= lower < upper <= 16 on each axis.
   [[nodiscard]] static VoxelShape box(IVec3 lower, IVec3 upper);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <utility>
 
@@ -11,6 +12,26 @@ namespace {
 
 bool is_finite(const Vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+// Returns true if all corners of an element are within the range of corners after its turn, except for rounding.
+bool stays_near(const ShapeElement& element) {
+  constexpr double kRounding = 1e-3;
+  const ElementTurn& turn = *element.turn;
+  const double angle = double{turn.degrees} * std::numbers::pi / 180.0;
+  const double scale = turn.rescales ? 1.0 / std::abs(std::cos(angle)) : 1.0;
+  const int u = (turn.axis + 1) % 3;
+  const int v = (turn.axis + 2) % 3;
+  for (int corner = 0; corner < 4; ++corner) {
+    const double along_u = double{((corner & 1) != 0 ? element.max : element.min)[u]} - double{turn.origin[u]};
+    const double along_v = double{((corner & 2) != 0 ? element.max : element.min)[v]} - double{turn.origin[v]};
+    const double at_u = turn.origin[u] + scale * (std::cos(angle) * along_u - std::sin(angle) * along_v);
+    const double at_v = turn.origin[v] + scale * (std::sin(angle) * along_u + std::cos(angle) * along_v);
+    for (const double at : {at_u, at_v}) {
+      if (!(at >= kMinShapeUnit - kRounding && at <= kMaxShapeUnit + kRounding)) return false;
+    }
+  }
+  return true;
 }
 
 // Returns the reason if an element is not valid, or an empty string.
@@ -33,6 +54,10 @@ std::string error_of(const ShapeElement& element) {
     if (element.turn->rescales && std::abs(std::cos(element.turn->degrees * 0.01745329252F)) < 0.1F) {
       return "the turn cannot be rescaled";
     }
+    for (int axis = 0; axis < 3; ++axis) {
+      if (std::abs(element.turn->origin[axis]) > 1'024.0F) return "the origin of the turn is beyond 1,024 sixteenths";
+    }
+    if (!stays_near(element)) return "the turn moves a corner outside -16 to 32 sixteenths";
   }
   for (const ElementFace& face : element.faces) {
     if (!face.part) continue;
