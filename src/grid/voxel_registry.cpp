@@ -115,6 +115,7 @@ std::string error_of_faces(const VoxelProperties& p) {
 // Returns the reason if a type does not declare the bits of its state that select its orientation, or an empty string.
 std::string error_of_orientations(const VoxelProperties& p) {
   if (p.orientations.by_value.size() > AxisOrientation::kCount) return "more than 48 orientations";
+  if (p.orientations.first_bit >= kMaxStateBits) return "the first bit is not 0 to 31";
   if (p.orientations.first_bit + p.orientations.bit_count() > p.state_bits) {
     return "they use bits of the state that `state_bits` does not declare";
   }
@@ -363,11 +364,17 @@ void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
   c.release_textures(c.properties[type].faces);
   if (!c.properties[type].faces.empty()) --c.textured_count;
   if (!properties.faces.empty()) ++c.textured_count;
+  // Shapes of types without states take state 0, also where a fluid's data says otherwise.
+  const bool reads_state_otherwise =
+      !properties.shapes.empty() && (c.properties[type].state_bits == 0) != (properties.state_bits == 0);
   const bool is_formed_otherwise =
+      reads_state_otherwise ||
       !(c.properties[type].shapes == properties.shapes && c.properties[type].orientations == properties.orientations);
   // Equal shapes stay the same, with the models that consumers know.
   if (!is_formed_otherwise) properties.shapes = c.properties[type].shapes;
-  const bool is_seen_otherwise = was != visibility || occluded != c.occlusion[type];
+  // Shapes hide and light by their material, which VoxelRegistry::visibility does not show.
+  const bool is_seen_otherwise =
+      was != visibility || occluded != c.occlusion[type] || c.properties[type].visibility != properties.visibility;
   const bool is_coloured_otherwise =
       !(c.properties[type].colour == properties.colour && c.properties[type].faces == properties.faces &&
         c.properties[type].field_textures == properties.field_textures);

@@ -128,7 +128,8 @@ void for_each_look(const VoxelProperties& type, FunctionRef<void(const VoxelFace
 struct TypeChange {
   VoxelType type = kAir;
   bool visibility_changed =
-      false;                    ///< `visibility` or `occludes`; an unregistered type counts as opaque, with defaults
+      false;                    ///< `visibility`, also of shapes' material, or `occludes`; an unregistered type counts
+                                ///< as opaque, with defaults
   bool colour_changed = false;  ///< `colour`, `faces`, `field_textures`; also true if it was added
   bool shape_changed = false;   ///< `shapes` or `orientations`; also true if the type was added with some
 };

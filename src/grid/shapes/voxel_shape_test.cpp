@@ -155,6 +155,27 @@ TEST(VoxelShape, RegistryChecksStatesAndTexturesOfShapes) {
   EXPECT_TRUE(types.has_shapes());
 }
 
+TEST(VoxelShape, RegistryReportsChangesOfAllThatShapesDependOn) {
+  VoxelRegistry types;
+  const VoxelShapes fluid = *VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid});
+  const VoxelType half = *types.add({.name = "slab", .shapes = slab()});
+  const VoxelType water = *types.add({.name = "water", .visibility = Visibility::Transparent, .shapes = fluid});
+  ChangeCursor cursor = types.cursor();
+  types.replace(half, {.name = "slab", .visibility = Visibility::Transparent, .shapes = slab()});
+  types.replace(water, {.name = "water", .visibility = Visibility::Transparent, .state_bits = 4, .shapes = fluid});
+  const TypeChanges changes = types.changes_since(cursor);
+  ASSERT_EQ(changes.items_unless_all().size(), 2U);
+  EXPECT_TRUE(changes.items_unless_all()[0].visibility_changed) << "shapes of glass hide no faces";
+  EXPECT_TRUE(changes.items_unless_all()[1].shape_changed) << "levels count only with bits for them";
+}
+
+TEST(VoxelShape, RegistryRejectsOrientationsBeyondTheState) {
+  StateOrientations one{.first_bit = 32, .by_value = {AxisOrientation::quarter_turns(1, 1)}};
+  EXPECT_FALSE(validate_type({.name = "stone", .state_bits = 32, .orientations = one}));
+  one.first_bit = 31;
+  EXPECT_TRUE(validate_type({.name = "stone", .state_bits = 32, .orientations = one}));
+}
+
 TEST(VoxelShape, StatesTurn) {
   const StateOrientations turns = StateOrientations::about_y(1);
   EXPECT_EQ(turns.bit_count(), 2);
