@@ -179,6 +179,21 @@ TEST_P(LiveData, FollowsTypesThatStartToDependOnData) {
   EXPECT_EQ(change_chest(3), 0U);
 }
 
+// Faces that a type's orientations turn are in the quads.
+TEST(LiveConvert, RemeshesTypesWithOtherOrientations) {
+  OneGrid one;
+  VoxelProperties log{.name = "log", .colour = {}, .state_bits = 2, .orientations = StateOrientations::along_axes()};
+  const VoxelType type = add_type(one.scene, log);
+  one.grid().set({1, 1, 1}, type, {.state = 1});
+  LiveMeshes meshes(LiveMeshOptions{});
+  meshes.finish(one.scene, {});
+  EXPECT_EQ(meshes.take().size(), 1U);
+  log.orientations = StateOrientations::about_y();
+  one.scene.types.replace(type, log);
+  meshes.finish(one.scene, {});
+  EXPECT_EQ(meshes.take().size(), 1U);
+}
+
 INSTANTIATE_TEST_SUITE_P(All, LiveData,
                          testing::Values(DataCase{"Blocky", SurfaceStyle::Blocky, false},
                                          DataCase{"Lit", SurfaceStyle::Blocky, true},

@@ -579,6 +579,8 @@ ChangedTypes MeshScheduler::follow_types(const VoxelRegistry& types) {
     }
   };
   add(changed.visibility, &TypeChange::visibility_changed);
+  // Other orientations give other quads.
+  add(changed.visibility, &TypeChange::shape_changed);
   add(changed.colour, &TypeChange::colour_changed);
   changed.data = types_with_new_data(types_.registry.get(), types);
   types_.registry = std::make_shared<const VoxelRegistry>(types);
