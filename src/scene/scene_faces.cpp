@@ -10,6 +10,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/mesh/blocky.h>
 
+#include "core/coordinates/chunk_order.h"
 #include "core/moved_from.h"
 #include "scene/scene_follower.h"
 
@@ -45,8 +46,20 @@ struct ChunkCount {
 bool has_any_of(const Grid& grid, const TypeChanges& changes) {
   const std::vector<VoxelType> types = grid.types();
   return changes.all || std::ranges::any_of(changes.items_unless_all(), [&](const TypeChange& change) {
-           return change.visibility_changed && std::ranges::binary_search(types, change.type);
+           return (change.visibility_changed || change.shape_changed) && std::ranges::binary_search(types, change.type);
          });
+}
+
+// Adds the chunks whose faces shapes may hide otherwise than before. A shape follows its neighbours, also their state.
+void add_chunks_near(IVec3 chunk, const IBox& box, std::vector<IVec3>& chunks) {
+  const IVec3 origin = chunk * kChunkEdge;
+  const IVec3 first = chunk_of(origin + box.min - 2);
+  const IVec3 last = chunk_of(origin + box.max + 1);
+  for (int z = first.z; z <= last.z; ++z) {
+    for (int y = first.y; y <= last.y; ++y) {
+      for (int x = first.x; x <= last.x; ++x) chunks.emplace_back(x, y, z);
+    }
+  }
 }
 
 /// Counts the chunks at `first`, `first + step` and so on.
@@ -75,7 +88,7 @@ struct SceneFaces::Impl {
   void count_in(const Scene& scene, GridHandle handle);
 };
 
-// Grids with voxels of types that became opaque or transparent are counted from scratch.
+// Grids with voxels of types that became opaque or transparent, or have other shapes, are counted from scratch.
 void SceneFaces::Impl::forget_those_with(const TypeChanges& types, const Scene& scene,
                                          std::vector<GridHandle>& touched) {
   for (auto& [handle, faces] : grids) {
@@ -91,12 +104,22 @@ void SceneFaces::Impl::follow(const Scene& scene, GridHandle handle, std::vector
   const SceneGrid* entry = scene.grids().find(handle);
   if (entry == nullptr || !follower.places(handle)) return;
   GridFaces& faces = grids[handle];
-  const GridChanges changes = entry->grid.changes_since(faces.read);
+  ChangeCursor data_read = faces.read;
+  GridChanges changes = entry->grid.changes_since(faces.read);
+  DataChanges data;
+  if (scene.types.has_shapes()) data = entry->grid.data_changes_since(data_read);
+  changes.all |= data.all;
   if (changes.all) {
     faces.visible_of.clear();
     faces.visible = 0;
   }
-  for (const IVec3 chunk : chunks_to_mesh(entry->grid, changes)) chunks.push_back({&entry->grid, &faces, chunk, 0});
+  std::vector<IVec3> near = chunks_to_mesh(entry->grid, changes);
+  if (scene.types.has_shapes() && !changes.all) {
+    for (const ChunkChange& change : changes.items_unless_all()) add_chunks_near(change.chunk, change.box, near);
+    for (const DataChange& change : data.items_unless_all()) add_chunks_near(change.chunk, change.box, near);
+    sort_and_unite(near);
+  }
+  for (const IVec3 chunk : near) chunks.push_back({&entry->grid, &faces, chunk, 0});
 }
 
 void SceneFaces::Impl::count(std::vector<ChunkCount>& chunks, const VoxelRegistry& types, Threads threads) {

@@ -8,6 +8,7 @@
 
 #include <quoin/scene/scene_meshes.h>
 
+#include "grid/shapes/shapes_for_tests.h"
 #include "mesh/mesh_oracle.h"
 
 namespace quoin {
@@ -124,6 +125,38 @@ TEST(SceneFaces, CountAnotherSceneFromScratch) {
     EXPECT_EQ(faces.update(scene), slow_counts(scene, InstanceFilter::Visible));
     scene.edit(grid).grid.set({40, 40, 40}, 1);
     EXPECT_EQ(faces.update(scene.snapshot()), slow_counts(scene, InstanceFilter::Visible));
+  }
+}
+
+TEST(SceneFaces, FollowShapesAndTheirStates) {
+  constexpr unsigned kSeed = 7;
+  std::mt19937 random(kSeed);
+  Scene scene;
+  const ShapeTypes types(scene.types);
+  // Covers sides that its other neighbours select.
+  const VoxelShape plate = VoxelShape::box({0, 0, 0}, {1, 16, 16});
+  const VoxelShapes follower =
+      *VoxelShapes::from_rules({.parts = {{.shape = plate, .when = {{.connected = {Direction::PosX}}}},
+                                          {.shape = VoxelShape::box({7, 0, 7}, {9, 16, 9})}},
+                                .neighbours = ShapeNeighbours::Connected});
+  const VoxelType screen = *scene.types.add({.name = "screen", .shapes = follower});
+  const std::vector<VoxelType> all = {kAir, types.stone, types.stone, types.slab, types.stairs, types.door, screen};
+  const GridHandle handle = scene.add_grid({});
+  scene.add_instance({.grid = handle});
+  SceneFaces faces;
+  for (int round = 0; round < 600; ++round) {
+    const auto near_border = [&] { return kChunkEdge - 3 + static_cast<int>(random() % 6); };
+    const IVec3 at{near_border(), near_border(), near_border()};
+    Grid& grid = scene.edit(handle).grid;
+    if (random() % 2 == 0) grid.set(at, all[random() % all.size()]);
+    if (grid.get(at) != kAir) (void)grid.set_data(at, {.state = static_cast<std::uint32_t>(random() % 4)});
+    if (round % 100 == 99) {
+      VoxelProperties slab = scene.types[types.slab];
+      slab.shapes = VoxelShape::box({0, 0, 0}, {16, 1 + round / 100, 16});
+      slab.visibility = round % 200 == 99 ? Visibility::Transparent : Visibility::Opaque;
+      scene.types.replace(types.slab, slab);
+    }
+    ASSERT_EQ(faces.update(scene), count_faces(scene)) << "seed " << kSeed << " " << round;
   }
 }
 
