@@ -192,12 +192,14 @@ void SceneTracer::Impl::refer_to(const Scene& other) noexcept {
   }
 }
 
-// Discards the data of types that became transparent or ceased to be, or whose shapes changed. Returns false if there
-// are none.
+// Discards the data of types that became transparent or ceased to be, or whose shapes or looks of shapes changed.
+// Returns false if there are none.
 bool SceneTracer::Impl::update_types(const TypeChanges& changes) {
   std::vector<VoxelType> changed;
   for (const TypeChange& change : changes.items_unless_all()) {
-    if (change.visibility_changed || change.shape_changed) changed.push_back(change.type);
+    // Textures decide which parts of shapes are glass.
+    const bool has_other_looks = change.colour_changed && scene->types.is_shaped(change.type);
+    if (change.visibility_changed || change.shape_changed || has_other_looks) changed.push_back(change.type);
   }
   if (!has_other_visibility(changes) && changed.empty()) return false;
   std::vector<GridHandle> kept;

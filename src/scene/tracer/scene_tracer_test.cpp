@@ -1,5 +1,6 @@
 
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <numbers>
 #include <random>
@@ -217,6 +218,27 @@ TEST(SceneTracer, SkipsHiddenEmptyAndInvalidInstances) {
   scene.add_instance(instance);
   EXPECT_EQ(placed_in(SceneTracer(scene)).size(), 1U);
   EXPECT_EQ(placed_in(SceneTracer(scene, InstanceFilter::All)).size(), 2U);
+}
+
+// Shapes without textures are glass.
+TEST(SceneTracer, FindsGlassAmongShapesWhoseLooksChange) {
+  Scene scene;
+  VoxelProperties pane{.name = "pane", .visibility = Visibility::Transparent};
+  pane.shapes = VoxelShape::box({0, 0, 7}, {16, 16, 9});
+  VoxelProperties leaves = pane;
+  leaves.faces = VoxelFaces(*Texture::from_image("leaf", {16, 16, std::vector<std::uint8_t>(4 * 16 * 16, 255)}));
+  const VoxelType type = *scene.types.add(leaves);
+  const GridHandle grid = scene.add_grid({});
+  scene.edit(grid).grid.set({1, 1, 1}, type);
+  scene.add_instance({.grid = grid});
+  SceneTracer tracer(scene);
+  EXPECT_FALSE(tracer.has_transparent());
+  scene.types.replace(type, pane);
+  tracer.update();
+  EXPECT_TRUE(tracer.has_transparent());
+  scene.types.replace(type, leaves);
+  tracer.update();
+  EXPECT_FALSE(tracer.has_transparent());
 }
 
 TEST(SceneTracer, VisitsTransparentVoxelsWithoutHitting) {
