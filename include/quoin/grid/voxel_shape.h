@@ -289,7 +289,8 @@ class VoxelShapes {
   /// Returns the bits of the state that select shapes. Requires: not empty.
   [[nodiscard]] std::uint32_t state_mask() const;
   /// Returns the model of a state. A voxel without any present part has an empty model. Lifetime: that of any copy of
-  /// these shapes. Cost: a lookup; microseconds at the first use of a combination. Requires: not empty.
+  /// these shapes. Cost: a lookup; microseconds at the first use of a combination. Memory: kilobytes for each set of
+  /// present parts and orientation (fluids: set of heights) that was used. Requires: not empty.
   [[nodiscard]] const ShapeModel& model(std::uint32_t state, const AxisOrientation& orientation,
                                         const ShapeSurroundings& around) const;
 

@@ -163,6 +163,12 @@ struct GridVoxels {
   [[nodiscard]] std::uint32_t state(IVec3 at) const { return grid.data(at).state; }
 };
 
+bool has_shapes(const Chunk* chunk, const VoxelRegistry& types) {
+  if (chunk == nullptr) return false;
+  const std::vector<VoxelType> all = chunk->types();
+  return std::any_of(all.begin(), all.end(), [&](VoxelType type) { return types.is_shaped(type); });
+}
+
 std::size_t row_of(IVec3 local) {
   return static_cast<std::size_t>(local.y + kChunkEdge * local.z);
 }
@@ -209,14 +215,9 @@ bool covers(const VoxelRegistry& types, VoxelType neighbour, const ShapeModel* n
 
 std::shared_ptr<const ShapeIndex::ChunkShapes> ShapeIndex::made(const Grid& grid, IVec3 chunk) const {
   const Neighbourhood near = grid.neighbourhood(chunk);
-  const auto has_shapes = [&](const Chunk* each) {
-    if (each == nullptr) return false;
-    const std::vector<VoxelType> types = each->types();
-    return std::any_of(types.begin(), types.end(), [&](VoxelType type) { return types_.is_shaped(type); });
-  };
   std::array<bool, 27> is_read{};
   bool is_any = false;
-  for (std::size_t i = 0; i < 27; ++i) is_any |= is_read[i] = has_shapes(near.chunks[i]);
+  for (std::size_t i = 0; i < 27; ++i) is_any |= is_read[i] = has_shapes(near.chunks[i], types_);
   if (!is_any) return nullptr;
 
   struct Touch {
@@ -314,6 +315,7 @@ void ShapeIndex::build(const Grid& grid, const VoxelRegistry& types) {
   if (is_shaped_.empty()) return;
   std::set<IVec3, ByZyx> chunks;  // with shapes, and around them
   for (const IVec3 chunk : grid.chunks()) {
+    if (!has_shapes(grid.find_chunk(chunk), types_)) continue;
     for (int i = 0; i < 27; ++i) chunks.insert(chunk + Neighbourhood::offset(i));
   }
   for (const IVec3 chunk : chunks) rebuild(grid, chunk);

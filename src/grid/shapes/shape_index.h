@@ -65,7 +65,7 @@ class ShapeIndex {
     bool is_begun_ = false;
   };
 
-  // Replaces everything. Cost: O(rows) per chunk with shaped types.
+  // Replaces everything. Cost: O(rows) per chunk with shaped types, and around them; O(types) per other chunk.
   void build(const Grid& grid, const VoxelRegistry& types);
   // Applies edits of the grid and of its data. Returns the chunks whose touched voxels may have changed, by z, y, x.
   // Requires: as OccupancyTree::update; if any type's shapes have changed, `changes.all` is true.

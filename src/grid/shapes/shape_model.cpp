@@ -428,28 +428,29 @@ struct VoxelShapes::Content {
       return (word * 0x9E37'79B9'7F4A'7C15U + rest * 0xC2B2'AE3D'27D4'EB4FU) >> 56;
     }
   };
-  using Entry = std::pair<const Key, ShapeModel>;
+  using Entry = std::pair<const Key, const ShapeModel*>;
+  // What a model consists of. All states in which the same parts are present share one.
+  struct Look {
+    std::uint64_t parts = 0;  // bit per part
+    std::array<std::uint8_t, 4> heights{};
+    std::uint8_t orientation = 0;
+
+    auto operator<=>(const Look&) const = default;
+  };
 
   ShapeRules rules;
   std::uint32_t state_mask = 0;
-  bool uses_connections = false;
-  std::mutex mutex;                                     // guards `models`
-  std::map<Key, ShapeModel> models;                     // entries never move
+  std::mutex mutex;                                     // guards `models` and `known`
+  std::map<Look, ShapeModel> models;                    // entries never move
+  std::map<Key, const ShapeModel*> known;               // entries never move
   std::array<std::atomic<const Entry*>, 256> recent{};  // by Key::slot
 
-  [[nodiscard]] ShapeModel make(const Key& key, const AxisOrientation& orientation) const;
+  [[nodiscard]] std::uint64_t parts_of(const Key& key) const;
+  [[nodiscard]] ShapeModel make(const Look& look, const AxisOrientation& orientation) const;
 };
 
-ShapeModel VoxelShapes::Content::make(const Key& key, const AxisOrientation& orientation) const {
-  ModelBuilder builder;
-  if (rules.neighbours == ShapeNeighbours::Fluid) {
-    if (std::ranges::count(key.heights, key.heights[0]) == 4) {
-      builder.add({.max = Vec3(kUnit, static_cast<float>(std::max<std::uint8_t>(key.heights[0], 1)), kUnit)}, {});
-    } else {
-      builder.add_fluid(key.heights);
-    }
-    return builder.finish();
-  }
+// Returns the parts that are present.
+std::uint64_t VoxelShapes::Content::parts_of(const Key& key) const {
   const DirectionSet connected = DirectionSet::from_bits(key.connected);
   const auto holds = [&](const ShapeCondition& condition) {
     if ((key.state & condition.state_mask) != (condition.state & condition.state_mask)) return false;
@@ -457,8 +458,28 @@ ShapeModel VoxelShapes::Content::make(const Key& key, const AxisOrientation& ori
     return (condition.connected.bits() & ~connected.bits()) == 0 &&
            (condition.unconnected.bits() & connected.bits()) == 0;
   };
-  for (const ShapePart& part : rules.parts) {
-    if (!part.when.empty() && std::none_of(part.when.begin(), part.when.end(), holds)) continue;
+  static_assert(kMaxShapeParts <= 64, "a bit per part");
+  std::uint64_t present = 0;
+  for (std::size_t i = 0; i < rules.parts.size(); ++i) {
+    const std::vector<ShapeCondition>& when = rules.parts[i].when;
+    if (when.empty() || std::any_of(when.begin(), when.end(), holds)) present |= std::uint64_t{1} << i;
+  }
+  return present;
+}
+
+ShapeModel VoxelShapes::Content::make(const Look& look, const AxisOrientation& orientation) const {
+  ModelBuilder builder;
+  if (rules.neighbours == ShapeNeighbours::Fluid) {
+    if (std::ranges::count(look.heights, look.heights[0]) == 4) {
+      builder.add({.max = Vec3(kUnit, static_cast<float>(std::max<std::uint8_t>(look.heights[0], 1)), kUnit)}, {});
+    } else {
+      builder.add_fluid(look.heights);
+    }
+    return builder.finish();
+  }
+  for (std::size_t i = 0; i < rules.parts.size(); ++i) {
+    if ((look.parts >> i & 1U) == 0) continue;
+    const ShapePart& part = rules.parts[i];
     for (const ShapeElement& element : part.shape.elements()) builder.add(element, orientation * part.orientation);
   }
   return builder.finish();
@@ -521,13 +542,19 @@ const ShapeModel& VoxelShapes::model(std::uint32_t state, const AxisOrientation&
   }
   std::atomic<const Content::Entry*>& recent = c.recent[key.slot()];
   if (const Content::Entry* entry = recent.load(std::memory_order_acquire); entry != nullptr && entry->first == key) {
-    return entry->second;
+    return *entry->second;
   }
   const std::scoped_lock lock(c.mutex);
-  auto known = c.models.find(key);
-  if (known == c.models.end()) known = c.models.emplace(key, c.make(key, orientation)).first;
+  auto known = c.known.find(key);
+  if (known == c.known.end()) {
+    const bool is_fluid = c.rules.neighbours == ShapeNeighbours::Fluid;
+    const Content::Look look{is_fluid ? 0 : c.parts_of(key), key.heights, key.orientation};
+    auto model = c.models.find(look);
+    if (model == c.models.end()) model = c.models.emplace(look, c.make(look, orientation)).first;
+    known = c.known.emplace(key, &model->second).first;
+  }
   recent.store(&*known, std::memory_order_release);
-  return known->second;
+  return *known->second;
 }
 
 bool VoxelShapes::operator==(const VoxelShapes& other) const {

@@ -88,6 +88,18 @@ TEST(VoxelShape, CrossedPlatesHaveFourFacesAndNoBits) {
   }
 }
 
+TEST(VoxelShape, StatesWithTheSamePartsShareAModel) {
+  // A piston, say: many bits are compared, few of their values matter.
+  const VoxelShapes shapes = *VoxelShapes::from_rules(
+      {.parts = {{.shape = slab()},
+                 {.shape = VoxelShape::box({0, 8, 0}, {8, 16, 8}), .when = {{.state_mask = 0xFFFF, .state = 7}}}}});
+  const ShapeModel& lower = shapes.model(0, {}, {});
+  for (std::uint32_t state = 0; state < 1'000; ++state) {
+    EXPECT_EQ(&shapes.model(state, {}, {}) == &lower, state != 7) << state;
+  }
+  EXPECT_EQ(shapes.model(7, {}, {}).boxes.size(), 2U);
+}
+
 TEST(VoxelShape, TextureCoordinatesAgreeWithCubes) {
   const VoxelShapes shapes(VoxelShape::box({0, 0, 0}, {16, 16, 16}));
   const ShapeModel& model = model_of(shapes);
