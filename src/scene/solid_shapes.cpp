@@ -272,7 +272,10 @@ bool SolidShapes::Impl::follow_types(const VoxelRegistry& types) {
   // Unregistered types are solid.
   const auto is_other = [&](std::size_t i) { return (i >= now.size() || now[i]) != (i >= solid.size() || solid[i]); };
   bool is_any_other = changes->all && types.has_shapes();
-  for (const TypeChange& change : changes->items_unless_all()) is_any_other |= change.shape_changed;
+  // Shapes connect to opaque types.
+  for (const TypeChange& change : changes->items_unless_all()) {
+    is_any_other |= change.shape_changed || (change.visibility_changed && types.has_shapes());
+  }
   for (std::size_t i = 1; i < std::max(now.size(), solid.size()); ++i) is_any_other |= is_other(i);
   solid = std::move(now);
   changes.commit();

@@ -397,6 +397,14 @@ TEST(ShapeBodies, SolidShapesHaveTheBoxesOfShapes) {
   types.replace(kSlab, slab);
   shapes.update(grid, types);
   EXPECT_EQ(sorted(found()), sorted(all_boxes(grid, types)));
+  // Fences do not connect to glass, which is as solid as stone.
+  grid.fill_box({{60, 0, 2}, {68, 1, 3}}, kStone);
+  shapes.update(grid, types);
+  VoxelProperties stone = types[kStone];
+  stone.visibility = Visibility::Transparent;
+  types.replace(kStone, stone);
+  shapes.update(grid, types);
+  EXPECT_EQ(sorted(found()), sorted(all_boxes(grid, types)));
 }
 
 }  // namespace
