@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <vector>
@@ -502,6 +504,46 @@ TEST_F(CTextures, GiveMeshesNumbersCoordinatesAndTints) {
   EXPECT_EQ(data.textures, nullptr);
   EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
   EXPECT_EQ(quoin_free(split), QUOIN_OK);
+}
+
+// A post, turned by 30 degrees, whose sides have a texture or only a tint.
+TEST_F(CTextures, GiveMeshesOfShapesTheirOwnLooks) {
+  ASSERT_EQ(quoin_scene_save(scene_, test_file("cubes.json").c_str()), QUOIN_OK) << quoin_last_error();
+  std::ifstream file(test_file("cubes.json"));
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::string texels(1'024, 'A');  // 16 x 16 black texels
+  const std::string post =
+      R"("shapes": {"textures": [{"name": "post", "size": 16, "texels": ")" + texels +
+      R"("}], "parts": [{"elements": [{"min": [4, 0, 4], "max": [12, 16, 12], "turn": {"degrees": 30}, "faces": [)"
+      R"({"face": {"tint": [10, 20, 30, 255]}}, {"face": {"tint": [10, 20, 30, 255]}}, {"face": {"texture": 0}},)"
+      R"({"face": {"texture": 0}}, {"face": {"texture": 0}}, {"face": {"texture": 0}}]}]}]}, )";
+  text.insert(text.find('{', text.find("\"types\"")) + 1, post);
+  const std::string version = "\"quoin_scene\": 2";
+  ASSERT_NE(text.find(version), std::string::npos) << text.substr(0, 99);
+  text.replace(text.find(version), version.size(), "\"quoin_scene\": 9");
+  std::ofstream(test_file("posts.json")) << text;
+  quoin_scene scene = 0;
+  ASSERT_EQ(quoin_scene_load(test_file("posts.json").c_str(), &scene), QUOIN_OK) << quoin_last_error();
+  auto options = sized<quoin_mesh_options>();
+  quoin_mesh mesh = 0;
+  ASSERT_EQ(quoin_grid_mesh(scene, 0, &options, &mesh), QUOIN_OK) << quoin_last_error();
+  auto data = sized<quoin_mesh_data>();
+  ASSERT_EQ(quoin_mesh_view(mesh, &data), QUOIN_OK);
+  ASSERT_NE(data.textures, nullptr);
+  std::size_t sides = 0;
+  for (std::size_t i = 0; i < data.vertex_count; ++i) {
+    const float* const normal = data.normals + 3 * i;
+    if (data.types[i] != 1 || std::abs(normal[1]) > 0.5F) continue;
+    ++sides;
+    EXPECT_NEAR(std::max(std::abs(normal[0]), std::abs(normal[2])), std::sqrt(0.75F), 1e-5F);
+    const bool is_tinted = std::abs(normal[0]) > std::abs(normal[2]);
+    EXPECT_EQ(data.textures[i], is_tinted ? QUOIN_NO_TEXTURE : 0U);
+    EXPECT_EQ(data.tints[4 * i + 2], is_tinted ? 30 : 255);
+    EXPECT_EQ(data.colours[4 * i + 2], is_tinted ? 30 : 0);
+  }
+  EXPECT_GT(sides, 0U);
+  EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
 TEST_F(CTextures, GiveTypesTheirMeanColour) {

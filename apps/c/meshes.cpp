@@ -69,11 +69,14 @@ void add_smooth_vertices(const MeshView& view, std::size_t at, GridMesh& mesh) {
 }
 
 void add_block_vertices(const MeshView& view, std::size_t at, const std::vector<Rgba8>& palette, GridMesh& mesh) {
-  std::array<Vec3, 6> normals;
-  for (std::size_t i = 0; i < normals.size(); ++i) normals[i] = Vec3(normal_of(static_cast<Direction>(i)));
   for (std::size_t i = 0; i < view.positions.size(); ++i) {
-    mesh.normals[at + i] = normals[static_cast<std::size_t>(view.directions[i])];
+    mesh.normals[at + i] = normal_at(view, i);
     mesh.colours[at + i] = palette[view.types[i]];
+    if (view.looks.empty() || view.looks[i].face == 0) continue;
+    // A shape's face without a texture has the colour of its tint.
+    const VoxelFace& face = view.faces[view.looks[i].face - 1];
+    if (face.texture.is_null())
+      mesh.colours[at + i] = {face.tint.r, face.tint.g, face.tint.b, palette[view.types[i]].a};
   }
   for (std::size_t i = 0; i < view.block_occlusion.size(); ++i)
     mesh.occlusion[at + i] = static_cast<float>(view.block_occlusion[i]) / 3.0F;
@@ -179,7 +182,10 @@ Result<GridMesh> mesh_of(const Scene& from, GridHandle handle, const quoin_mesh_
   const auto meshes = options.smooth != 0 ? mesh_scene_smoothly(alone, {}, threads, progress())
                                           : mesh_scene(alone, blocks, threads, progress());
   if (!meshes) return meshes.error();
-  if (options.smooth != 0 || !alone.types.has_textures()) return put_together(*meshes, nullptr);
+  // Shapes can have textures that their type has not.
+  if (options.smooth != 0 || !(alone.types.has_textures() || alone.types.has_shapes())) {
+    return put_together(*meshes, nullptr);
+  }
   if (textures != nullptr) return put_together(*meshes, &textures->set);
   TextureSet own;
   own.add(alone.types);

@@ -223,7 +223,7 @@ typedef struct quoin_mesh_data {
   /* [vertex_count], for grids meshed as blocks. Blocks come first, with four vertices and six indices per face
    * (watertight: possibly more). The surfaces of fields follow, with type 0. */
   const uint16_t* types;
-  /* For grids meshed as blocks, if any type of the scene has faces. A face shows tint times texture. */
+  /* For grids meshed as blocks, if any type of the scene has faces or shapes. A face shows tint times texture. */
   const uint32_t* textures; /* [vertex_count]: numbers as in quoin_face; QUOIN_NO_TEXTURE: the tint is the colour */
   const float* texture_uvs; /* [vertex_count][2]: rightwards and downwards, 1 per voxel; the texture repeats */
   const uint8_t* tints;     /* [vertex_count][4], sRGB */

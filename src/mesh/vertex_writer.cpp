@@ -225,6 +225,16 @@ std::array<std::byte, 16> encoded(Rgba8 colour, VertexFormat format) {
   return bytes;
 }
 
+constexpr std::uint32_t kNoTexture = ~std::uint32_t{0};
+
+// Returns the number of a face's texture, which may be null.
+std::uint32_t number_in(const TextureSet& textures, const VoxelFace& face) {
+  if (face.texture.is_null()) return kNoTexture;
+  const auto layer = textures.find(face.texture);
+  const bool fits = layer && layer->array <= 0xFFFFU && layer->layer <= 0xFFFFU;
+  return fits ? layer->array << 16 | layer->layer : kNoTexture;
+}
+
 std::size_t face_of(Direction direction) {
   return static_cast<std::size_t>(direction);
 }
@@ -395,6 +405,7 @@ void VertexWriter::read_faces(const VoxelRegistry& types, const TextureSet& text
     return std::ranges::any_of(layout_.elements,
                                [&](const VertexElement& each) { return each.attribute == attribute; });
   };
+  if (has(VertexAttribute::Texture) && (types.has_shapes() || types.has_turned_by_state())) layers_ = textures;
   if (!types.has_textures()) return;
   if (types.has_turned_by_state()) {
     turned_.assign(types.size(), 0);
@@ -414,9 +425,7 @@ void VertexWriter::read_faces(const VoxelRegistry& types, const TextureSet& text
                                        : static_cast<std::uint8_t>(face->turn + (face->mirrored ? 4 : 0)));
     }
     if (!has_textures) return;
-    const auto layer = face == nullptr ? std::nullopt : textures.find(face->texture);
-    const bool fits = layer && layer->array <= 0xFFFFU && layer->layer <= 0xFFFFU;
-    textures_.push_back(fits ? layer->array << 16 | layer->layer : ~std::uint32_t{0});
+    textures_.push_back(face == nullptr ? kNoTexture : number_in(textures, *face));
   });
 }
 
@@ -504,18 +513,34 @@ void VertexWriter::write(const MeshView& mesh, Vec3 origin, std::span<std::byte>
   write_view(mesh, origin, out);
 }
 
+VertexWriter::FacesOfView VertexWriter::faces_of(const MeshView& mesh) const {
+  FacesOfView faces;
+  if (mesh.looks.empty()) return faces;
+  faces.tints.resize(layout_.elements.size());
+  for (std::size_t i = 0; i < layout_.elements.size(); ++i) {
+    const VertexElement& element = layout_.elements[i];
+    if (element.attribute == VertexAttribute::Texture && faces.textures.empty()) {
+      for (const VoxelFace& face : mesh.faces) faces.textures.push_back(number_in(layers_, face));
+    }
+    if (element.attribute != VertexAttribute::Tint) continue;
+    for (const VoxelFace& face : mesh.faces) faces.tints[i].push_back(encoded(face.tint, element.format));
+  }
+  return faces;
+}
+
 void VertexWriter::write_view(const MeshView& mesh, Vec3 origin, std::span<std::byte> out) const {
   QUOIN_ASSERT(out.size() >= bytes_needed(mesh.positions.size()), "room for the vertices");
   const auto has_uvs = [](const VertexElement& each) { return each.attribute == VertexAttribute::TextureUv; };
   // A vertex's face is found by its triangles, so for all vertices at once.
   std::vector<std::array<float, 2>> uvs;
   if (std::ranges::any_of(layout_.elements, has_uvs)) uvs = texture_uvs(mesh);
+  const FacesOfView faces = faces_of(mesh);
   by_blocks(mesh.positions.size(), 1, layout_.stride, out.data(),
             [&](std::size_t first, std::size_t count, std::byte* block) {
               for (std::size_t i = 0; i < layout_.elements.size(); ++i) {
                 const VertexElement& element = layout_.elements[i];
                 if (!has_uvs(element)) {
-                  write_element(i, mesh, first, count, origin, block);
+                  write_element(i, mesh, faces, first, count, origin, block);
                   continue;
                 }
                 const Column column{block + element.offset, layout_.stride};
@@ -525,17 +550,19 @@ void VertexWriter::write_view(const MeshView& mesh, Vec3 origin, std::span<std::
             });
 }
 
-void VertexWriter::write_element(std::size_t index, const MeshView& mesh, std::size_t first, std::size_t count,
-                                 Vec3 origin, std::byte* block) const {
+void VertexWriter::write_element(std::size_t index, const MeshView& mesh, const FacesOfView& faces, std::size_t first,
+                                 std::size_t count, Vec3 origin, std::byte* block) const {
   const VertexElement& element = layout_.elements[index];
   const Column column{block + element.offset, layout_.stride};
   const VertexFormat format = element.format;
   const auto vertices = [&](auto value_of) { return PerVertex{column, count, value_of}; };
+  const auto look_of = [&](std::size_t i) { return mesh.looks.empty() ? 0U : mesh.looks[i].face; };
   switch (element.attribute) {
     case VertexAttribute::Position:
       return put_positions(format, vertices([&](auto i) { return mesh.positions[first + i] + origin; }));
     case VertexAttribute::Normal:
       if (!mesh.normals.empty()) return put_normals(format, vertices([&](auto i) { return mesh.normals[first + i]; }));
+      if (!mesh.looks.empty()) return put_normals(format, vertices([&](auto i) { return normal_at(mesh, first + i); }));
       return put_normals(format, vertices([&](auto i) { return face_normals()[face_of(mesh.directions[first + i])]; }));
     case VertexAttribute::Face:
       return put_numbers(format, vertices([&](auto i) { return mesh.directions[first + i]; }));
@@ -552,10 +579,14 @@ void VertexWriter::write_element(std::size_t index, const MeshView& mesh, std::s
       return put_numbers(format, vertices([&](auto i) { return mesh.types[first + i]; }));
     case VertexAttribute::Texture:
       return put_numbers(format, vertices([&](auto i) {
+                           const std::uint32_t look = look_of(first + i);
+                           if (look != 0) return faces.textures[look - 1];
                            return texture(face_number(mesh.types[first + i], mesh.directions[first + i]));
                          }));
     case VertexAttribute::Tint:
       return put_encoded(format, vertices([&](auto i) -> const Colour& {
+                           const std::uint32_t look = look_of(first + i);
+                           if (look != 0) return faces.tints[index][look - 1];
                            return colour(index, face_number(mesh.types[first + i], mesh.directions[first + i]));
                          }));
     case VertexAttribute::Uv:         // no view has any

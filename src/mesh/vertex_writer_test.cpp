@@ -224,6 +224,46 @@ TEST(VertexWriter, WritesTexturesOfViewsAndOfOneArray) {
   }
 }
 
+// Views name the faces of shapes and of cubes that their state turns.
+TEST(VertexWriter, WritesLooksOfViews) {
+  VoxelRegistry types = textured_types();
+  const StateOrientations turns = StateOrientations::about_y_and_upside_down();
+  const VoxelType turned =
+      types.add({.name = "turned", .state_bits = 3, .faces = types[2].faces, .orientations = turns}).value();
+  const VoxelFace drawn{.texture = Texture::from_image("s", noise(16, 9)).value(), .tint = {90, 80, 70, 255}};
+  ShapeElement post{.min = {4, 0, 4}, .max = {12, 16, 12}, .turn = ElementTurn{.axis = 1, .degrees = 30.0F}};
+  post.faces.fill({.face = drawn});
+  const VoxelType shaped = types.add({.name = "post", .shapes = VoxelShape::from_elements({post}).value()}).value();
+  TextureSet textures;
+  textures.add(types);
+  Grid grid;
+  for (int i = 0; i < 8; ++i) grid.set({2 * i, 0, 0}, turned, {.state = static_cast<std::uint32_t>(i)});
+  grid.set({0, 4, 0}, shaped);
+  grid.set({0, 8, 0}, 1);
+  const auto mesh = build_blocky_mesh(grid, types, {});
+  const MeshView view = view_of(mesh->surfaces[0], SurfaceClass::Opaque);
+  ASSERT_FALSE(view.looks.empty());
+  const VertexWriter writer({28,
+                             {{VertexAttribute::Texture, Uint32, 0},
+                              {VertexAttribute::TextureUv, Float32x2, 4},
+                              {VertexAttribute::Tint, Unorm8x4Srgb, 12},
+                              {VertexAttribute::Normal, Float32x3, 16}}},
+                            types, textures);
+  std::vector<std::byte> bytes(writer.bytes_needed(view.positions.size()));
+  writer.write(view, Vec3(0.0F), bytes);
+  for (std::size_t i = 0; i < view.positions.size(); ++i) {
+    const VoxelFace* const face = face_at(view, i, types);
+    ASSERT_NE(face, nullptr);
+    const auto number = read<std::uint32_t>(bytes, 28 * i);
+    ASSERT_NE(number, 0xFFFF'FFFFU);
+    EXPECT_EQ(textures[(TextureLayer{number >> 16, number & 0xFFFF})], face->texture);
+    EXPECT_EQ(read<Rgba8>(bytes, 28 * i + 12), (Rgba8{face->tint.r, face->tint.g, face->tint.b, 255}));
+    EXPECT_EQ(read<Vec3>(bytes, 28 * i + 16), normal_at(view, i));
+    if (view.looks[i].face == 0) continue;
+    EXPECT_EQ((read<std::array<float, 2>>(bytes, 28 * i + 4)), view.looks[i].uv);
+  }
+}
+
 // Files can have textures of several sizes, so a set can have more arrays than 16 bits can name.
 TEST(VertexWriter, WritesNoTextureForArraysBeyondItsFormat) {
   VoxelRegistry types;

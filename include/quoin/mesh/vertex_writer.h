@@ -38,7 +38,8 @@ enum class VertexAttribute : std::uint8_t {
   /// `texture_coordinates` relative to the quad's voxel, -64 to 64. They repeat with every voxel. Of blocks: relative
   /// to the lowest corner of the face, which all triangles that share vertices form.
   TextureUv,
-  /// Tint of the face; for types without textures their colour. The face shows tint times texture.
+  /// Tint of the face; for types without textures their colour. The face shows tint times texture. For these three,
+  /// vertices of views with a look of their own (VertexLook) have the face that it names.
   Tint,
 };
 
@@ -139,9 +140,15 @@ class VertexWriter {
   using Colour = std::array<std::byte, 16>;
 
   void write_element(std::size_t index, std::span<const Quad> quads, Vec3 origin, std::byte* block) const;
+  // The textures and tints of the faces that a view names (MeshView::faces).
+  struct FacesOfView {
+    std::vector<std::uint32_t> textures;     // [face]
+    std::vector<std::vector<Colour>> tints;  // [element][face]
+  };
+  [[nodiscard, gnu::visibility("hidden")]] FacesOfView faces_of(const MeshView& mesh) const;
   void write_view(const MeshView& mesh, Vec3 origin, std::span<std::byte> out) const;
-  void write_element(std::size_t index, const MeshView& mesh, std::size_t first, std::size_t count, Vec3 origin,
-                     std::byte* block) const;
+  void write_element(std::size_t index, const MeshView& mesh, const FacesOfView& faces, std::size_t first,
+                     std::size_t count, Vec3 origin, std::byte* block) const;
   void write_shading(VertexFormat format, const MeshView& mesh, std::size_t first, std::size_t count,
                      std::byte* at) const;
   // Returns the entry of a type or face; the last one for unregistered types.
@@ -181,6 +188,7 @@ class VertexWriter {
   std::vector<std::size_t> turned_;      // by type: the number of its first face with an orientation, or 0
   std::vector<std::uint32_t> textures_;  // [face_number]; empty if no element needs them
   std::vector<std::uint8_t> turns_;      // [face_number]: turn + 4 * mirrored; empty if no element needs them
+  TextureSet layers_;                    // for the faces that views name; empty if types or elements need none
 };
 
 }  // namespace quoin
