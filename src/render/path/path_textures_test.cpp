@@ -194,6 +194,32 @@ TEST(PathTextures, ShowsEqualTranslucentTexelsAsGlass) {
   }
 }
 
+// Paths that pass a translucent texel are as likely to meet the glass behind it as others.
+TEST(PathTextures, MeetsGlassBehindTranslucentTexels) {
+  constexpr std::uint8_t kAlpha = 150;
+  const auto image_of = [](bool has_pane) {
+    Scene scene;
+    VoxelProperties glass;
+    glass.colour = {0, 0, 0, 128};
+    glass.visibility = Visibility::Transparent;
+    glass.ior = 1.0F;
+    const VoxelType dark = scene.types.add(glass).value();
+    std::array<VoxelFace, 6> faces;
+    faces.fill({.texture = drawn([](int, int) { return Rgba8{0, 0, 0, kAlpha}; }), .alpha = FaceAlpha::Translucent});
+    faces[static_cast<std::size_t>(Direction::PosX)].alpha = FaceAlpha::Cutout;
+    VoxelProperties hollow = textured(faces[0], Visibility::Transparent);
+    hollow.faces = VoxelFaces(faces);
+    const VoxelType pane = scene.types.add(hollow).value();
+    Grid grid;
+    grid.fill_box({{-8, 0, -8}, {8, 1, 8}}, dark);
+    if (has_pane) grid.fill_box({{-8, 4, -8}, {8, 5, 8}}, pane);
+    place(scene, std::move(grid));
+    return mean_of(path_image(scene, from_above(0.0, 9.0, 0.0, 6.0), under_even_sky(16, 16, 64)));
+  };
+  constexpr double kOpen = 1.0 - kAlpha / 255.0;
+  EXPECT_NEAR(image_of(true).x / (image_of(false).x * kOpen * kOpen), 1.0, 0.05);
+}
+
 // A block of visible cutout texels in a lake of another grid looks as one of opaque texels.
 TEST(PathTextures, ShowsTexelsWithinGlassOfAnotherGrid) {
   const auto image_of = [](FaceAlpha alpha, std::uint8_t opacity) {

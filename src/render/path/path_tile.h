@@ -154,10 +154,10 @@ class PathTile {
   // Traces a ray through glass before `t`, if the scene has glass. Returns true if the path's ray ends there.
   bool meet_glass(std::uint32_t index, double t);
   bool pass_glass(std::uint32_t index);
+  // In the following, `u` is a random number between 0 and 1, which stays uniform for paths that go on.
   // Traces the scattering bodies and the faces before the first glass, and removes them from `seen_`.
-  bool pass_clouds(std::uint32_t index);
-  // Traces the faces up to `max_t`, from `seen_.faces[next]` on. Returns true if the path ends at one of them. `u`: a
-  // random number, which stays uniform.
+  bool pass_clouds(std::uint32_t index, float& u);
+  // Traces the faces up to `max_t`, from `seen_.faces[next]` on. Returns true if the path ends at one of them.
   bool pass_faces(std::uint32_t index, double max_t, std::size_t& next, float& u);
   // Scatters a path in a body if `u` is below the share of paths that scatter there.
   void scatter_in(std::uint32_t index, const GlassBody& body, float u);
@@ -166,8 +166,8 @@ class PathTile {
   // Returns true if the path scatters in fog before `until`, and sets `until` to that distance.
   [[nodiscard]] bool ends_in_fog(const Path& path, double& until) const;
   void hit_air(std::uint32_t index, double t, Vec3 colour, float anisotropy, std::int32_t placed);
-  bool enter_glass(std::uint32_t index);
-  bool leave_glass(std::uint32_t index);
+  bool enter_glass(std::uint32_t index, float u);
+  bool leave_glass(std::uint32_t index, float u);
   void turn_at(Path& path, const DVec3& point, Vec3 direction, Vec3 normal, double lift, VoxelType inside);
   // Processes one ray of a packet that neither glass nor fog stops.
   void meet_lane(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane, double until);

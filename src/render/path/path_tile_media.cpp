@@ -43,9 +43,10 @@ bool PathTile::meet_glass(std::uint32_t index, double t) {
   Path& path = paths_[index];
   find_transparent(*context_->view, *context_->surfaces, {path.origin, DVec3(path.direction)}, t, seen_);
   if (!path.is_seen) return pass_glass(index);
-  if (path.inside == kAir && pass_clouds(index)) return true;
-  if (path.inside != kAir) return leave_glass(index);
-  return !seen_.bodies.empty() && enter_glass(index);
+  float u = path.random.one(path.dimension + dimension::kGlass);
+  if (path.inside == kAir && pass_clouds(index, u)) return true;
+  if (path.inside != kAir) return leave_glass(index, u);
+  return !seen_.bodies.empty() && enter_glass(index, u);
 }
 
 bool PathTile::pass_faces(std::uint32_t index, double max_t, std::size_t& next, float& u) {
@@ -92,12 +93,10 @@ bool PathTile::pass_glass(std::uint32_t index) {
   return pass_faces(index, kInfinite, next_face, u);
 }
 
-bool PathTile::pass_clouds(std::uint32_t index) {
-  Path& path = paths_[index];
+bool PathTile::pass_clouds(std::uint32_t index, float& u) {
   const auto first_glass = std::ranges::find_if(
       seen_.bodies, [&](const GlassBody& body) { return !((*context_->surfaces)[body.type].scattering > 0.0F); });
   if (first_glass == seen_.bodies.begin() && seen_.faces.empty()) return false;
-  float u = path.random.one(path.dimension + dimension::kGlass);
   std::size_t next_face = 0;
   for (auto body = seen_.bodies.begin(); body != first_glass; ++body) {
     if (pass_faces(index, body->t_enter, next_face, u)) return true;
@@ -124,17 +123,16 @@ void PathTile::scatter_in(std::uint32_t index, const GlassBody& body, float u) {
   hit_air(index, t, surface.colour, surface.anisotropy, body.placed);
 }
 
-bool PathTile::enter_glass(std::uint32_t index) {
+bool PathTile::enter_glass(std::uint32_t index, float u) {
   QUOIN_ASSERT(!seen_.bodies.empty(), "a path that meets glass");
   Path& path = paths_[index];
   const GlassBody body = seen_.bodies.front();
   std::optional<Surface> textured;
   const Surface& surface = surface_of(*context_->surfaces, body, textured);
   const Ray ray{path.origin, DVec3(path.direction)};
-  const float u = path.random.one(path.dimension + dimension::kGlass);
   if (body.starts_inside) {  // the camera is inside
     path.inside = body.type;
-    return leave_glass(index);
+    return leave_glass(index, u);
   }
   const DVec3 in_grid_normal = normal_entered(*context_->view, ray, body);
   const PlacedGrid& placed = context_->placed[static_cast<std::size_t>(body.placed)];
@@ -166,7 +164,7 @@ bool PathTile::enter_glass(std::uint32_t index) {
 }
 
 // Follows a path within glass to the end of the body, or to an object inside it.
-bool PathTile::leave_glass(std::uint32_t index) {
+bool PathTile::leave_glass(std::uint32_t index, float u) {
   QUOIN_ASSERT(paths_[index].inside != kAir, "a path within glass");
   Path& path = paths_[index];
   const Ray ray{path.origin, DVec3(path.direction)};
@@ -174,15 +172,14 @@ bool PathTile::leave_glass(std::uint32_t index) {
   const bool is_within = !bodies.empty() && bodies.front().starts_inside && bodies.front().type == path.inside;
   if (!is_within) {  // the path left through a corner, or by rounding
     path.inside = kAir;
-    if (pass_clouds(index)) return true;
-    return !bodies.empty() && !bodies.front().starts_inside && enter_glass(index);
+    if (pass_clouds(index, u)) return true;
+    return !bodies.empty() && !bodies.front().starts_inside && enter_glass(index, u);
   }
   const GlassBody body = bodies.front();
   const Surface& surface = (*context_->surfaces)[body.type];
   path.throughput *= tint_of(surface, body.voxels);
   const PlacedGrid& placed = context_->placed[static_cast<std::size_t>(body.exit_placed)];
   const double lift = kRayLift * placed.voxel_size;
-  float u = path.random.one(path.dimension + dimension::kGlass);
   // Faces of another grid, within the glass or at its end.
   std::size_t next_face = 0;
   const bool is_closed = seen_.is_closed() && seen_.end <= body.t_exit + lift;

@@ -113,9 +113,9 @@ void pass_through(Body body, inout float u, inout Glass glass) {
   }
 }
 
-void enter_glass(Body body, inout Glass glass) {
+// `u`: a random number between 0 and 1.
+void enter_glass(Body body, float u, inout Glass glass) {
   Surface surface = surface_of(body.what.x);
-  float u = number(kOfGlass);
   vec3 in_grid = normal_entered(body);
   vec3 normal = turned(placed_at(body.voxel.w).view_axes, in_grid) / placed_at(body.voxel.w).ref_inside.w;
   vec3 direction = path.direction.xyz;
@@ -147,7 +147,7 @@ void enter_glass(Body body, inout Glass glass) {
 }
 
 // Follows a path within glass to the end of the body, or to an object inside it, at `opaque_t`.
-void leave_glass(Body body, bool has_next, Body next, float opaque_t, inout Glass glass) {
+void leave_glass(Body body, bool has_next, Body next, float opaque_t, float u, inout Glass glass) {
   Surface surface = surface_of(body.what.x);
   path.throughput.xyz *= tint_of(surface, body.lengths.z);
   int instance = int(body.what.w >> 3);
@@ -167,7 +167,7 @@ void leave_glass(Body body, bool has_next, Body next, float opaque_t, inout Glas
   float cosine = clamp(dot(normal, direction), 1e-4, 1.0);
   float eta = surface.ior / other;
   vec2 through = refraction(cosine, eta);
-  bool is_mirrored = number(kOfGlass) < through.x;
+  bool is_mirrored = u < through.x;
   glass.outcome = kTurnsAtGlass;
   glass.instance = instance;
   glass.t = body.lengths.y;
@@ -177,15 +177,16 @@ void leave_glass(Body body, bool has_next, Body next, float opaque_t, inout Glas
   glass.within = is_mirrored ? body.what.x : touches ? next.what.x : 0;
 }
 
-// Handles the first glass body on a ray (clouds are skipped), and the body after it.
-void look_into(bool has_body, Body body, bool has_next, Body next, float opaque_t, inout Glass glass) {
+// Handles the first glass body on a ray (clouds are skipped), and the body after it. `u`: a random number between 0 and
+// 1 that no cloud has used.
+void look_into(bool has_body, Body body, bool has_next, Body next, float opaque_t, float u, inout Glass glass) {
   bool is_within = has_body && is_begun(body) && (path.more.x == 0 || body.what.x == path.more.x);
   if (is_within) {  // or the camera is inside
     path.more.x = body.what.x;
-    leave_glass(body, has_next, next, opaque_t, glass);
+    leave_glass(body, has_next, next, opaque_t, u, glass);
     return;
   }
   // A path that was in glass left through a corner, or by rounding.
   path.more.x = 0;
-  if (has_body && !is_begun(body)) enter_glass(body, glass);
+  if (has_body && !is_begun(body)) enter_glass(body, u, glass);
 }

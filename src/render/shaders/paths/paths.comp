@@ -670,7 +670,7 @@ void step_path() {
         requests[i - 1].light *= passed;
       } else if (glass.outcome == kGoesOn) {
         if (is(kIsSeen) && (has_first || path.more.x != 0)) {
-          look_into(has_first, first, has_next, body, opaque_t, glass);
+          look_into(has_first, first, has_next, body, opaque_t, u, glass);
         } else if (list.dropped_t < kInfinity) {
           // Bodies that did not fit are searched for in a separate step.
           path.throughput.w = list.dropped_t;
