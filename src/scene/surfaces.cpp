@@ -223,8 +223,9 @@ void Surfaces::put(VoxelType type, const VoxelProperties& properties) {
   const FieldTextures& field = properties.field_textures;
   constexpr float kRadians = std::numbers::pi_v<float> / 180.0F;
   made->field_scale = 1.0F / field.voxels;
-  made->steep_y = std::cos(field.steep_degrees * kRadians);
   made->flat_y = std::cos(field.flat_degrees * kRadians);
+  // Slopes that hardly differ can have the same cosine.
+  made->steep_y = std::min(std::cos(field.steep_degrees * kRadians), std::nextafter(made->flat_y, 0.0F));
   for (const Direction each : kDirections) {
     made->sides[static_cast<std::size_t>(each)] = face_texels(properties.faces[each], each, emission_of(properties));
   }

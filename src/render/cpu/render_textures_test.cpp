@@ -254,6 +254,19 @@ TEST(RenderTextures, FieldsShowUpperTexturesOnFlatGroundAndSidesOnSlopes) {
   EXPECT_LT(between[1], kGrass.g - 20);
 }
 
+// 0 and 0.001 degrees have the same cosine.
+TEST(RenderTextures, FieldsShowUpperTexturesOnFlatGroundForSlopesThatHardlyDiffer) {
+  Scene scene;
+  VoxelProperties hill;
+  hill.faces = VoxelFaces({plain_texture(kRock)}, {plain_texture(kGrass)}, {plain_texture(kEarth)});
+  hill.field_textures = {.flat_degrees = 0.0F, .steep_degrees = 0.001F};
+  DensityGrid field;
+  field.add_box({-20, -20, -20}, {20, 0, 20}, scene.types.add(hill).value());
+  place_field(scene, std::move(field));
+  const RenderedImage image = taken(scene, facing(Direction::PosY, DVec3(0.0), 8.0), unlit(9, 9));
+  EXPECT_EQ(pixel_at(image, 4, 4), encoded(linear(kGrass)));
+}
+
 TEST(RenderTextures, FieldsRepeatTexturesByTheirEdge) {
   for (const float edge : {1.0F, 4.0F}) {
     Scene scene;
