@@ -448,7 +448,7 @@ void MaterialPalette::move_into_atlas(const MeshView& view, std::vector<std::arr
       tile = &tile_of(*face);
     }
     const auto size = static_cast<float>(tile->texture.size());
-    const bool is_shape = !types_[view.types[i]].shapes.empty();  // its coordinates lie in the texture
+    const bool is_shape = !view.looks.empty() && view.looks[i].is_shape;  // its coordinates lie in the texture
     Vec3 inside = Vec3(coordinates[i][0], coordinates[i][1], 0.0F) + (is_shape ? Vec3(0.0F) : first);
     // Elements that reach outside their voxel show the texture's edge there.
     if (is_shape) inside = glm::clamp(inside, 0.0F, 1.0F);

@@ -83,12 +83,14 @@ bool is_in_voxel(const MeshView& view, std::size_t first_index) {
   return extent.x <= 1.0F && extent.y <= 1.0F && extent.z <= 1.0F;
 }
 
-/// An atlas cannot repeat a texture on a merged face. Errors: InvalidArgument.
+/// An atlas cannot repeat a texture on a merged face. Shapes have coordinates of their own. Errors: InvalidArgument.
 Status check_face_sizes(const SceneMeshes& meshes) {
   for (const MeshPart& part : meshes.parts) {
     for (const MeshView& view : part.surfaces) {
       for (std::size_t i = 0; !view.has_albedo() && i < view.indices.size(); i += 3) {
-        if (meshes.types[view.types[view.indices[i]]].faces.empty() || is_in_voxel(view, i)) continue;
+        const std::uint32_t corner = view.indices[i];
+        const bool is_shape = !view.looks.empty() && view.looks[corner].is_shape;
+        if (is_shape || meshes.types[view.types[corner]].faces.empty() || is_in_voxel(view, i)) continue;
         return make_error(ErrorCode::InvalidArgument,
                           "cannot put textures into an atlas: part \"" + part.name +
                               "\" has faces of several voxels (mesh with BlockySceneOptions::atlas)");

@@ -867,7 +867,7 @@ std::vector<std::filesystem::path> obj_companions(const SceneMeshes& meshes, con
   const ObjNames names = names_beside(path);
   std::vector<std::filesystem::path> files = {names.library, names.palette};
   if (!meshes.atlas.rgb.empty()) files.push_back(names.atlas);
-  if (meshes.types.has_textures() && check_meshes(meshes)) {
+  if ((meshes.types.has_textures() || meshes.types.has_shapes()) && check_meshes(meshes)) {
     const auto palette = std::make_shared<const MaterialPalette>(meshes, face_colours_in(options));
     if (palette->has_emission()) files.push_back(names.emissive);
     std::vector<MeshFile> images;

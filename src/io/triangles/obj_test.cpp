@@ -305,6 +305,34 @@ TEST_F(Obj, RepeatsTexturesOnFaces) {
   EXPECT_EQ(files.size(), folder_.count());
 }
 
+// Programs ask before they replace the files that are listed.
+TEST_F(Obj, ListsImagesOfShapes) {
+  const AlphaImage image{16, 16, std::vector<std::uint8_t>(std::size_t{16} * 16 * 4, 255)};
+  ShapeElement post{.min = {4, 0, 4}, .max = {12, 16, 12}};
+  post.faces.fill({.face = VoxelFace{.texture = Texture::from_image("t", image).value()}});
+  const auto type = scene_.types.add({.name = "post", .shapes = VoxelShape::from_elements({post}).value()});
+  scene_.edit(grid_).grid.set({0, 9, 0}, type.value());
+  place({0, 0, 0});
+  meshes_ = *mesh_scene(scene_);
+  const auto path = folder_.file("post.obj");
+  ASSERT_TRUE(write_mesh(meshes_, path));
+  EXPECT_TRUE(std::filesystem::exists(folder_.file("post_texture_1.png")));
+  EXPECT_EQ(mesh_files(meshes_, path).value().size(), folder_.count());
+}
+
+// A beam that reaches into both neighbours, with the textures of its type.
+TEST_F(Obj, PutsTexturesOfLargeShapesIntoOneImage) {
+  const AlphaImage image{16, 16, std::vector<std::uint8_t>(std::size_t{16} * 16 * 4, 255)};
+  const ShapeElement beam{.min = {-14, 4, 4}, .max = {30, 12, 12}};
+  VoxelProperties type{.name = "beam", .faces = VoxelFace{.texture = Texture::from_image("t", image).value()}};
+  type.shapes = VoxelShape::from_elements({beam}).value();
+  scene_.edit(grid_).grid.set({0, 9, 0}, scene_.types.add(type).value());
+  place({0, 0, 0});
+  meshes_ = *mesh_scene(scene_, {.mesh = {.merge = false}});
+  const auto bytes = write_mesh(meshes_, folder_.file("beam.obj"), {.textures_in = TexturesIn::Atlas});
+  ASSERT_TRUE(bytes) << to_string(bytes.error());
+}
+
 TEST_F(Obj, PutsTexturesIntoOneImage) {
   Grid& grid = scene_.edit(grid_).grid;
   for (std::uint8_t i = 0; i < 6; ++i) {
