@@ -26,8 +26,8 @@ struct PlacedShape {
 // Returns the bounds of a box of a model, in voxels: the box itself unless it is tilted.
 [[nodiscard]] DBox bounds_of(const ModelBox& box);
 
-// Calls `visit(const DBox&)` for each colliding box of a model, in voxels: for the bounds of tilted ones, and of a fluid
-// with an inclined surface. Elements that bodies pass are left out, except `with_all`.
+// Calls `visit(const DBox&)` for each colliding box of a model, in voxels: for the bounds of tilted ones, and of a
+// fluid with an inclined surface. Elements that bodies pass are left out, except `with_all`.
 template <class Visit>
 void visit_solid_boxes(const ShapeModel& model, bool with_all, Visit&& visit) {
   for (const ModelBox& box : model.boxes) {
