@@ -63,7 +63,7 @@ struct ShapeElement {
   bool operator==(const ShapeElement&) const = default;
 };
 
-/// What a voxel consists of, instead of a full cube: a list of boxes. A handle to elements that never change: copies
+/// The content of a voxel that is no full cube: a list of boxes. A handle to elements that never change: copies
 /// share them. Null by default.
 ///
 ///   const VoxelShape slab = VoxelShape::box({0, 0, 0}, {16, 8, 16});
@@ -164,7 +164,7 @@ struct ShapePart {
   bool operator==(const ShapePart&) const = default;
 };
 
-/// What a shape takes from the voxels around it.
+/// The influence of the voxels around a shape.
 enum class ShapeNeighbours : std::uint8_t {
   None,
   /// Fences, walls, panes, wires: a side is connected if the neighbour is of a type of a common group

@@ -20,7 +20,7 @@ const ShapeRules* rules_of(const VoxelRegistry& types, VoxelType type) {
   return types.is_shaped(type) ? &types[type].shapes.rules() : nullptr;
 }
 
-// Finds what the neighbours of a voxel mean to its shape. `Voxels` has `get(IVec3)` and `state(IVec3)`.
+// Finds the influence of the neighbours of a voxel on its shape. `Voxels` has `get(IVec3)` and `state(IVec3)`.
 template <class Voxels>
 class SurroundingsFinder {
  public:
@@ -91,7 +91,7 @@ class SurroundingsFinder {
       const std::optional<AxisOrientation> stairs = stairs_at(at, rules, up);
       return stairs ? std::optional(stairs->apply(Direction::PosX)) : std::nullopt;
     };
-    // A neighbour bends the stairs unless the row goes on at the side towards which, or from which, it turns.
+    // A neighbour bends the stairs unless their row goes on beside it.
     const auto bends = [&](Direction side) { return front_at(voxel + normal_of(side)) != front; };
     const AxisOrientation back = turn.inverse();
     const auto turned_to = [&](IVec3 at) -> std::optional<Direction> {  // the unturned direction: +Z or -Z

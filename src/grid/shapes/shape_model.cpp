@@ -429,7 +429,7 @@ struct VoxelShapes::Content {
     }
   };
   using Entry = std::pair<const Key, const ShapeModel*>;
-  // What a model consists of. All states in which the same parts are present share one.
+  // The content of a model. All states in which the same parts are present share one.
   struct Look {
     std::uint64_t parts = 0;  // bit per part
     std::array<std::uint8_t, 4> heights{};
