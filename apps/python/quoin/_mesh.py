@@ -29,7 +29,7 @@ class Mesh:
     colours: Optional[NdArray]  #: uint8, (vertices, 4), sRGB without occlusion; only for grids
     occlusion: Optional[NdArray]  #: float32, (vertices,), 0 open to 1 dark; only for grids
     types: Optional[NdArray]  #: uint16, (vertices,), voxel types; only for blocks; 0: a field's surface
-    #: uint32, (vertices,), numbers in `Textures`, 2**32 - 1: none; only for blocks of scenes with textures
+    #: uint32, (vertices,), numbers in `Textures`, 2**32 - 1: none; only for blocks of scenes with textures or shapes
     textures: Optional[NdArray]
     #: float32, (vertices, 2), with `textures`: rightwards and downwards, 1 per voxel; the texture repeats
     texture_uvs: Optional[NdArray]
