@@ -70,10 +70,16 @@ double difference(const PathImage& a, const PathImage& b) {
 // Under a sky of radiance 1 a plane shows its colour, which the CPU renderer draws without light.
 TEST(PathTextures, ShowsTexelsOfALitPlaneAsRaysDo) {
   Scene scene;
-  const VoxelType type =
-      scene.types.add(textured({.texture = noise(255), .turn = 1, .tint = {255, 180, 90, 255}})).value();
+  VoxelProperties properties = textured({.texture = noise(255), .turn = 1, .tint = {255, 180, 90, 255}});
+  const VoxelType type = scene.types.add(properties).value();
+  properties.state_bits = 6;
+  for (int i = 0; i < AxisOrientation::kCount; ++i) properties.orientations.by_value.push_back(AxisOrientation::at(i));
+  const VoxelType turned = scene.types.add(properties).value();
   Grid grid;
   grid.fill_box({{-40, -1, -40}, {40, 0, 40}}, type);
+  for (int i = 0; i < AxisOrientation::kCount; ++i) {
+    grid.set({i % 7 - 2, -1, i / 7 - 2}, turned, {.state = static_cast<std::uint32_t>(i)});
+  }
   place(scene, std::move(grid));
   const Camera camera = from_above(1.0, 5.0, 1.0, 2.0);
   PathOptions options = under_even_sky(32, 32, 4);

@@ -466,7 +466,7 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
   }
   if (has_textures_or_lamps_) {
     const bool has_texels = context_->surfaces->has_textures() && !in_field && !in_shape;
-    if (has_texels) show_texel(type, face, vertex.in_grid, voxel, surface);
+    if (has_texels) show_texel(placed, type, face, vertex.in_grid, voxel, surface);
     if (light_.lamps != nullptr) vertex.place = memory_.place_of(vertex.placed, voxel, face);
   }
   vertex.in_view = context_->view->view_from_grid(vertex.placed).point(vertex.in_grid);
@@ -484,11 +484,20 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
   }
 }
 
-void PathTile::show_texel(VoxelType type, Direction face, const DVec3& position, IVec3 voxel, Surface& surface) const {
+void PathTile::show_texel(const PlacedGrid& placed, VoxelType type, Direction face, const DVec3& position, IVec3 voxel,
+                          Surface& surface) const {
   const TypeFaces* const faces = context_->surfaces->faces(type);
   if (faces == nullptr) return;
-  const FaceTexels& side = faces->sides[static_cast<std::size_t>(face)];
-  surface.colour = side.colour(side.texel(position, voxel, 0));
+  DVec3 inside = position - DVec3(voxel);
+  Direction shown = face;
+  const VoxelRegistry& types = context_->view->tracer().scene().types;
+  if (types.is_turned_by_state(type) && placed.level == 0) {
+    const AxisOrientation back = types[type].orientations.of(placed.voxels->data(voxel).state).inverse();
+    inside = back.apply(inside - 0.5) + 0.5;
+    shown = back.apply(face);
+  }
+  const FaceTexels& side = faces->sides[static_cast<std::size_t>(shown)];
+  surface.colour = side.colour(side.texel(inside, IVec3(0), 0));
   surface.emitted = surface.colour * side.emission;
 }
 

@@ -173,8 +173,8 @@ class PathTile {
   void meet_lane(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane, double until);
   void hit_matter(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane);
   // Gives a surface the texel at a position on a voxel's face, in the grid, if its type has textures.
-  __attribute__((noinline)) void show_texel(VoxelType type, Direction face, const DVec3& position, IVec3 voxel,
-                                            Surface& surface) const;
+  __attribute__((noinline)) void show_texel(const PlacedGrid& placed, VoxelType type, Direction face,
+                                            const DVec3& position, IVec3 voxel, Surface& surface) const;
   void hit_glass(std::uint32_t index, const GlassBody& body, const DVec3& normal_in_grid);
   void hit_face(std::uint32_t index, const MetFace& face);
   void hit_ground(std::uint32_t index, double t);
