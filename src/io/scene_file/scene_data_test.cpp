@@ -483,7 +483,7 @@ VoxelProperties shaped_type() {
   type.orientations.front = Direction::NegZ;
   type.field_textures = {.voxels = 4.0F, .flat_degrees = 20.0F, .steep_degrees = 30.5F};
   const Texture knob = random_texture("knob", 16, 7, false);
-  ShapeElement tilted{.min = Vec3(-15.5F, 0.1F, 3.0F), .max = Vec3(32.0F, 1.0F / 3.0F, 3.0F), .collides = false};
+  ShapeElement tilted{.min = Vec3(-15.5F, 0.1F, 3.0F), .max = Vec3(24.0F, 1.0F / 3.0F, 3.0F), .collides = false};
   tilted.turn = ElementTurn{.origin = Vec3(1.0F, 2.5F, -3.0F), .axis = 2, .degrees = 22.5F, .rescales = true};
   tilted.faces[0].is_drawn = false;
   tilted.faces[1].face = VoxelFace{.texture = knob, .turn = 2, .tint = {9, 8, 7, 255}};
