@@ -15,7 +15,7 @@
 #include <quoin/grid/voxel_shape.h>
 
 #include "core/death_for_tests.h"
-#include "grid/shapes/shapes_for_tests.h"
+#include "grid/shapes/shape_types_for_tests.h"
 #include "mesh/nets/sheets.h"
 
 namespace quoin {

@@ -8,7 +8,7 @@
 
 #include <quoin/scene/scene_meshes.h>
 
-#include "grid/shapes/shapes_for_tests.h"
+#include "grid/shapes/shape_types_for_tests.h"
 #include "mesh/mesh_oracle.h"
 
 namespace quoin {

@@ -77,8 +77,8 @@ class VoxelShape {
   ///
   /// Errors: InvalidArgument if there are no or more than kMaxShapeElements elements, a corner is not finite or outside
   ///         kMinShapeUnit to kMaxShapeUnit, also after the element's turn, an upper corner is below the lower one, an
-  ///         element has no extent along two axes, a turn, its axis or a part of a texture is not finite, or the origin
-  ///         of a turn is farther than 1,024 sixteenths away. The message names the element's index.
+  ///         element has no extent along two axes, a turn, its axis or a part of a texture is not finite, or a turn's
+  ///         origin is farther than 1,024 sixteenths away. The message names the element's index.
   [[nodiscard]] static Result<VoxelShape> from_elements(std::vector<ShapeElement> elements);
   /// Makes a box, in sixteenths. Requires: 0 <= lower < upper <= 16 on each axis.
   [[nodiscard]] static VoxelShape box(IVec3 lower, IVec3 upper);

@@ -190,8 +190,8 @@ inline constexpr float kSheetOffset = 0.01F;
 ///
 /// Shapes:    their faces, and those of cubes next to them, consist of squares of a sixteenth of a voxel. Faces of
 ///            cubes that only touch shapes at an edge get more outline vertices.
-/// Left out:  plates without thickness, such as plants. If `flat_shapes` is not null, it receives the number of voxels
-///            that have some.
+/// Left out:  plates without thickness, such as plants. If `flat_shapes` is not null, it receives the number of their
+///            voxels.
 /// Cost:      about a microsecond per square of a sixteenth, on one thread, and 4 KiB per two shaped voxels.
 [[nodiscard]] Result<BlockyTriangles> closed_surface(const Grid& grid, const VoxelRegistry& types,
                                                      const Progress& progress = {},

@@ -65,8 +65,8 @@ struct PropagatedLightOptions {
 ///          channel in which such a type emits keeps the type's own level.
 /// Lamps:   a type's level applies in its own voxel and spreads from there, even if the voxel is opaque.
 /// Shapes:  light passes between two voxels unless a shape of opaque material covers the common side of either wholly
-///          (ShapeModel::covers_side): a slab stops light downwards, a door behind it. This also applies to the light
-///          of lamps with shapes. A type that sets `blocks_light` stops light as a cube, or not at all.
+///          (ShapeModel::covers_side): a slab stops light downwards, a door behind it. This also applies to
+///          lamps with shapes. A type that sets `blocks_light` stops light as a cube, or not at all.
 /// Colours: a transparent type passes a channel of lamp light if that channel of its colour is at least half its
 ///          greatest channel. It always passes sky light. An opaque type that light passes does so for all channels.
 /// Exact:   the result equals a search from every lamp and every sky column (Dijkstra), independent of the order of

@@ -91,7 +91,7 @@ class SurroundingsFinder {
       const std::optional<AxisOrientation> stairs = stairs_at(at, rules, up);
       return stairs ? std::optional(stairs->apply(Direction::PosX)) : std::nullopt;
     };
-    // A neighbour bends the stairs unless their row goes on beside it.
+    // A neighbour bends the stairs unless their row goes on next to it.
     const auto bends = [&](Direction side) { return front_at(voxel + normal_of(side)) != front; };
     const AxisOrientation back = turn.inverse();
     const auto turned_to = [&](IVec3 at) -> std::optional<Direction> {  // the unturned direction: +Z or -Z

@@ -14,7 +14,7 @@
 #include <quoin/grid/voxel_shape.h>
 
 #include "grid/shapes/shape_index.h"
-#include "grid/shapes/shapes_for_tests.h"
+#include "grid/shapes/shape_types_for_tests.h"
 
 namespace quoin {
 namespace {

@@ -12,7 +12,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include "grid/shapes/shapes_for_tests.h"
+#include "grid/shapes/shape_types_for_tests.h"
 #include "io/gltf/gltf_for_tests.h"
 
 namespace quoin {

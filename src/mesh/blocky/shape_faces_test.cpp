@@ -16,7 +16,7 @@
 
 #include "core/instruction_sets_for_tests.h"
 #include "core/made_with_for_tests.h"
-#include "grid/shapes/shapes_for_tests.h"
+#include "grid/shapes/shape_types_for_tests.h"
 #include "mesh/blocky/blocky_mesher.h"
 #include "mesh/mesh_oracle.h"
 
@@ -300,7 +300,7 @@ TEST(ShapeFacesOfCubes, AreCubesForRenderersWithoutShapes) {
   EXPECT_EQ(found, expected);
 }
 
-TEST(ShapeFacesOfCubes, ASlabHasSixFacesAndDarkensTheGround) {
+TEST(ShapeFacesOfCubes, SlabHasSixFacesAndDarkensTheGround) {
   const VoxelRegistry types = shaped_types();
   Grid grid;
   grid.fill_box({IVec3(0), IVec3(5, 1, 5)}, 1);

@@ -8,7 +8,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <gtest/gtest.h>
 
-#include "grid/shapes/shapes_for_tests.h"
+#include "grid/shapes/shape_types_for_tests.h"
 #include "render/cpu/render_test_support.h"
 
 namespace quoin {

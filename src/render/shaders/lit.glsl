@@ -35,18 +35,18 @@ uint textures_of(uint type) {
 }
 
 // Returns the colour of the nearest texel, without tint, in the mipmap level that fits the distance of samples; matches
-// render/light/lighting.h on the CPU. `what`: of a textured face. `inside`: the position in the voxel.
+// render/light/lighting.h on the CPU. `record`: of a textured face. `inside`: the position in the voxel.
 // `square_spacing`: the square of the distance of samples there, in voxels; kMeanOfFace: the mean of the texture.
-vec3 texel_of(uvec4 what, vec3 inside, float square_spacing) {
-  int last = int(what.z & 15);
+vec3 texel_of(uvec4 record, vec3 inside, float square_spacing) {
+  int last = int(record.z & 15);
   // log2 of the texels between samples, rounded: half the exponent of twice their square, plus that of the size.
   int exponent = int(floatBitsToUint(2.0 * square_spacing) >> 23) - 127;
   uint log_size = uint(last - clamp((exponent >> 1) + last, 0, last));
-  uint column = texel_number(inside, what.z >> 4 & 7, 1u << log_size);
-  uint row = texel_number(inside, what.z >> 8 & 7, 1u << log_size);
+  uint column = texel_number(inside, record.z >> 4 & 7, 1u << log_size);
+  uint row = texel_number(inside, record.z >> 8 & 7, 1u << log_size);
   // The levels before have size^2 * (1 + 1/4 + ...) texels.
   uint begin = ((4u << 2 * last) - (4u << 2 * log_size)) / 3;
-  uint texel = Numbers(what.xy).at[begin + (row << log_size) + column];
+  uint texel = Numbers(record.xy).at[begin + (row << log_size) + column];
   return linear_from_srgb(unpackUnorm4x8(texel).xyz);
 }
 

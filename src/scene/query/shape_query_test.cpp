@@ -9,7 +9,7 @@
 #include <quoin/scene/scene_query.h>
 
 #include "grid/shapes/shape_index.h"
-#include "grid/shapes/shapes_for_tests.h"
+#include "grid/shapes/shape_types_for_tests.h"
 #include "scene/query/field_scene_for_tests.h"
 
 namespace quoin {

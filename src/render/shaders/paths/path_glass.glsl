@@ -178,7 +178,7 @@ void leave_glass(Body body, bool has_next, Body next, float opaque_t, float u, i
 }
 
 // Handles the first glass body on a ray (clouds are skipped), and the body after it. `u`: a random number between 0 and
-// 1 that no cloud has used.
+// 1, not used by clouds.
 void look_into(bool has_body, Body body, bool has_next, Body next, float opaque_t, float u, inout Glass glass) {
   bool is_within = has_body && is_begun(body) && (path.more.x == 0 || body.what.x == path.more.x);
   if (is_within) {  // or the camera is inside
