@@ -114,8 +114,8 @@ struct FaceTexels {
 };
 
 /// Returns the mipmap level of a texture with 2^log_size texels per side, for samples whose distance has this square,
-/// in sides of the texture. The level is log2 of the texels between samples, rounded. That is half the exponent of twice
-/// their square, plus the texture's own size.
+/// in sides of the texture. The level is log2 of the texels between samples, rounded. That is half the exponent of
+/// twice their square, plus the texture's own size.
 [[nodiscard]] inline int mipmap_level(double square, int log_size) {
   const auto exponent = static_cast<int>(std::bit_cast<std::uint64_t>(2.0 * square) >> 52 & 0x7FF) - 1023;
   return std::clamp((exponent >> 1) + log_size, 0, log_size);
