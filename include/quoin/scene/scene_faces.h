@@ -25,9 +25,9 @@ class SceneFaces {
   SceneFaces& operator=(SceneFaces&&) noexcept;
   ~SceneFaces();
 
-  /// Counts the changes since the last update: the chunks of `chunks_to_mesh`, with shapes also those at most two voxels
-  /// away from a change of voxels or states, and grids that were placed, hidden or removed. Counts the whole scene the first
-  /// time, for another scene, and grids with a type whose visibility or shapes changed.
+  /// Counts the changes since the last update: the chunks of `chunks_to_mesh`, with shapes also those at most two
+  /// voxels away from a change of voxels or states, and grids that were placed, hidden or removed. Counts the whole
+  /// scene the first time, for another scene, and grids with a type whose visibility or shapes changed.
   /// Cost:    some tens of microseconds per chunk; uses several threads for many chunks.
   /// Threads: reads the scene, which must not be edited during the call.
   const FaceCounts& update(const Scene& scene, Threads threads = {});
