@@ -629,7 +629,7 @@ TEST_F(StreamedWorldWithProps, OpensWorldsOfVersion3AsStreamed) {
     ASSERT_TRUE(world->flush().has_value());
     EXPECT_TRUE(is_streamed(*world, "prop")) << "until the world is opened again";
   }
-  EXPECT_EQ(summarize_world(path())->version, 5);
+  EXPECT_EQ(summarize_world(path())->version, 6);
   auto world = StreamedWorld::open(path(), WorldAccess::Write);
   ASSERT_TRUE(world.has_value());
   EXPECT_TRUE(is_streamed(*world, "land"));

@@ -61,7 +61,7 @@ TEST(WorldMaintenance, SummarizesAndChecksSoundWorld) {
   make_world(path);
   const auto summary = summarize_world(path);
   ASSERT_TRUE(summary) << to_string(summary.error());
-  EXPECT_EQ(summary->version, 5);
+  EXPECT_EQ(summary->version, 6);
   EXPECT_EQ(summary->types, 9U);
   EXPECT_EQ(summary->values, 1U);
   EXPECT_EQ(summary->saves, 1U);
