@@ -84,6 +84,7 @@ class FormatTable {
   FormatTable() {
     drivers_.reserve(kMost);
     infos_.reserve(kMost);
+// NOLINTBEGIN(bugprone-macro-parentheses,readability-container-size-empty): the arguments are names and literals
 #define QUOIN_ADD(driver) add(driver);
 #define QUOIN_ADD_GROUPED(group, driver, id, first, others)                                                   \
   if constexpr (group.is_built) {                                                                             \
@@ -93,6 +94,7 @@ class FormatTable {
     add_left_out({id, first, "left out of this build", {}, others}, group.option);                            \
   }
     QUOIN_FORMATS(QUOIN_ADD, QUOIN_ADD_GROUPED)
+    // NOLINTEND(bugprone-macro-parentheses,readability-container-size-empty)
 #undef QUOIN_ADD
 #undef QUOIN_ADD_GROUPED
   }
