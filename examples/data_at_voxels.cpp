@@ -13,7 +13,10 @@ constexpr std::uint32_t kNorth = 1;  // one of four directions, in two bits
 
 quoin::Result<int> run(const std::string& path) {
   quoin::Scene scene;
-  const auto stairs = scene.types.add({.name = "stairs", .colour = {150, 110, 70, 255}, .state_bits = 2});
+  const auto stairs = scene.types.add({.name = "stairs",
+                                       .colour = {150, 110, 70, 255},
+                                       .state_bits = 2,
+                                       .orientations = quoin::StateOrientations::about_y()});
   if (!stairs) return stairs.error();
   const auto chest = scene.types.add({.name = "chest", .colour = {120, 80, 30, 255}});
   if (!chest) return chest.error();
@@ -30,7 +33,7 @@ quoin::Result<int> run(const std::string& path) {
   world.set(step, *stairs, {.state = kNorth});
   world.set(box, *chest, {.bytes = inventory});
   quoin::CopyOptions turned;
-  turned.map_state = [](quoin::VoxelType, std::uint32_t state) { return (state + 1) % 4; };
+  turned.types = &scene.types;  // turns the states of types with `orientations`
   quoin::copy_box(world, house, world, {40, 0, 0}, quoin::AxisOrientation::quarter_turns(1, 1), turned);
 
   // Renderers follow voxel changes. Code that manages chests also follows data changes, even if no voxel changed.
