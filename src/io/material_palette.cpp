@@ -499,6 +499,7 @@ PngImage MaterialPalette::face_image(std::size_t image, const Vec3& tint) const 
 
 bool FaceAtlas::place() {
   std::vector<Tile*> order;
+  order.reserve(tiles_.size());
   for (Tile& tile : tiles_) order.push_back(&tile);
   std::ranges::stable_sort(order, std::greater<>(), [](const Tile* tile) { return tile->texture.size(); });
   for (int edge = 4 * kMargin; edge <= kMaxEdge; edge *= 2) {

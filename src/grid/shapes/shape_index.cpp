@@ -323,6 +323,7 @@ void ShapeIndex::build(const Grid& grid, const VoxelRegistry& types) {
 
 std::vector<IVec3> ShapeIndex::chunks() const {
   std::vector<IVec3> chunks;
+  chunks.reserve(chunks_.size());
   for (const auto& [chunk, shapes] : chunks_) chunks.push_back(chunk);
   std::sort(chunks.begin(), chunks.end(), ByZyx());
   return chunks;
