@@ -67,9 +67,8 @@ class SurroundingsFinder {
     if (others->neighbours == ShapeNeighbours::Connected) return (others->groups & rules.groups) != 0;
     // Other shapes that follow their neighbours are not asked, so that no two shapes wait for each other.
     if (!rules.connects_to_full_sides || others->neighbours != ShapeNeighbours::None) return false;
-    const Direction inward = static_cast<Direction>(static_cast<int>(outward) ^ 1);
     return types_[type].visibility == Visibility::Opaque &&
-           model(neighbour, type)->covers_side[static_cast<std::size_t>(inward)];
+           model(neighbour, type)->covers_side[static_cast<std::size_t>(opposite(outward))];
   }
 
   // Returns the orientation of stairs of a common group and with the same side up, or nullopt for other voxels.
@@ -169,6 +168,11 @@ bool has_shapes(const Chunk* chunk, const VoxelRegistry& types) {
   return std::any_of(all.begin(), all.end(), [&](VoxelType type) { return types.is_shaped(type); });
 }
 
+// Returns the number of a voxel in its chunk: x + 64 y + 4096 z.
+std::uint32_t number_of(IVec3 local) {
+  return static_cast<std::uint32_t>(local.x + kChunkEdge * (local.y + kChunkEdge * local.z));
+}
+
 std::size_t row_of(IVec3 local) {
   return static_cast<std::size_t>(local.y + kChunkEdge * local.z);
 }
@@ -234,7 +238,7 @@ std::shared_ptr<const ShapeIndex::ChunkShapes> ShapeIndex::made(const Grid& grid
     for (int z = cells.min.z; z < cells.max.z; ++z) {
       for (int y = cells.min.y; y < cells.max.y; ++y) {
         for (int x = cells.min.x; x < cells.max.x; ++x) {
-          touches.push_back({static_cast<std::uint32_t>(x + kChunkEdge * (y + kChunkEdge * z)), {local, type, model}});
+          touches.push_back({number_of({x, y, z}), {local, type, model}});
         }
       }
     }
@@ -261,8 +265,7 @@ std::shared_ptr<const ShapeIndex::ChunkShapes> ShapeIndex::made(const Grid& grid
   if (touches.empty()) return nullptr;
   const auto order = [](const Touch& t) {
     const IVec3 v = t.shape.voxel;
-    const bool is_other = static_cast<std::uint32_t>(v.x + kChunkEdge * (v.y + kChunkEdge * v.z)) != t.cell;
-    return std::tuple(t.cell, is_other, v.z, v.y, v.x);
+    return std::tuple(t.cell, number_of(v) != t.cell, v.z, v.y, v.x);
   };
   std::sort(touches.begin(), touches.end(), [&](const Touch& a, const Touch& b) { return order(a) < order(b); });
 

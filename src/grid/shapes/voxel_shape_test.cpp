@@ -241,12 +241,16 @@ TEST(ShapeAt, StairsFormCornersInAllTurns) {
   }
 }
 
+VoxelType add_water(VoxelRegistry& types) {
+  return *types.add({.name = "water",
+                     .visibility = Visibility::Transparent,
+                     .state_bits = 4,
+                     .shapes = *VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid})});
+}
+
 TEST(ShapeAt, FluidsInclineTowardsLowerNeighbours) {
   VoxelRegistry types;
-  const VoxelType water = *types.add({.name = "water",
-                                      .visibility = Visibility::Transparent,
-                                      .state_bits = 4,
-                                      .shapes = *VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid})});
+  const VoxelType water = add_water(types);
   Grid grid;
   for (int x = 0; x < 4; ++x) grid.set({x, 0, 0}, water, {.state = static_cast<std::uint32_t>(2 * x)});
   const ShapeModel* source = shape_at(grid, types, {0, 0, 0});
@@ -291,10 +295,7 @@ TEST(ShapeAt, SurfacesOfFluidsFaceOutwardForAllHeights) {
 
 TEST(ShapeAt, FallingFluidsMeetTheirNeighboursAtEqualHeights) {
   VoxelRegistry types;
-  const VoxelType water = *types.add({.name = "water",
-                                      .visibility = Visibility::Transparent,
-                                      .state_bits = 4,
-                                      .shapes = *VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid})});
+  const VoxelType water = add_water(types);
   Grid grid;
   grid.set({0, 0, 0}, water, {.state = 8});
   grid.set({1, 0, 0}, water);
