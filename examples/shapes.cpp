@@ -133,15 +133,22 @@ quoin::Result<Blocks> add_blocks(quoin::VoxelRegistry& types) {
   return Blocks{made[0], made[1], made[2], made[3], made[4], made[5], made[6], made[7]};
 }
 
+// Places a voxel where a player hits a face of another one, in the grid's space.
+void place(quoin::Grid& world, const quoin::VoxelRegistry& types, quoin::VoxelType type, quoin::IVec3 hit_voxel,
+           const quoin::PlacingHit& hit) {
+  const quoin::VoxelData data{.state = quoin::placed_state(types[type], hit)};
+  world.set(hit_voxel + quoin::normal_of(hit.face), type, data);
+}
+
 // A hut with a door between two torches, stairs up to its roof of slabs, and a garden behind a fence.
-quoin::Grid yard(const Blocks& b) {
+quoin::Grid yard(const quoin::VoxelRegistry& types, const Blocks& b) {
   quoin::Grid grid;
   grid.fill_box({{0, 0, 0}, {14, 1, 12}}, b.ground);
   grid.fill_box({{8, 1, 2}, {13, 4, 8}}, b.wall);
   grid.fill_box({{9, 1, 3}, {12, 4, 7}}, quoin::kAir);
   grid.fill_box({{8, 4, 2}, {13, 5, 8}}, b.slab);
   for (int y = 1; y < 3; ++y) grid.set({8, y, 5}, b.door, {.state = 0b100});
-  for (const int z : {4, 6}) grid.set({7, 3, z}, b.torch, {.state = 2});  // on the wall at +X
+  for (const int z : {4, 6}) place(grid, types, b.torch, {8, 3, z}, {.face = Direction::NegX, .look = {0.8, 0.3, 0.5}});
   for (int i = 0; i < 4; ++i) {
     grid.fill_box({{9 + i, 1, 8}, {10 + i, 1 + i, 9}}, b.wall);
     grid.set({9 + i, 1 + i, 8}, b.stairs);
@@ -159,7 +166,7 @@ quoin::Result<int> run() {
   quoin::Scene scene;
   const auto blocks = add_blocks(scene.types);
   if (!blocks) return blocks.error();
-  quoin::SceneGrid entry{.name = "yard", .grid = yard(*blocks)};
+  quoin::SceneGrid entry{.name = "yard", .grid = yard(scene.types, *blocks)};
   const quoin::ShapeModel* const corner = quoin::shape_at(entry.grid, scene.types, {0, 1, 1});
   std::printf("boxes of the fence's corner: %zu\n", corner->boxes.size());
   scene.add_instance({.name = "yard", .grid = scene.add_grid(std::move(entry))});

@@ -111,6 +111,36 @@ struct VoxelProperties {
   bool operator==(const VoxelProperties&) const = default;
 };
 
+/// The rule for a placed voxel's front (StateOrientations::front).
+enum class PlacedFront : std::uint8_t {
+  TowardsPlayer,   ///< a furnace
+  AwayFromPlayer,  ///< stairs: the low side is at the player
+  AwayFromWall,    ///< away from the face that was hit, if it is a side: a ladder; else towards the player
+};
+
+/// A player's hit on the face of a voxel, next to the voxel to place. Vectors are in the grid's space.
+struct PlacingHit {
+  Direction face = Direction::PosY;  ///< the face that was hit (SceneHit::face)
+  Vec3 point{0.5F, 1.0F, 0.5F};      ///< the point that was hit, in voxels from the hit voxel's minimum corner
+  DVec3 look{1.0, 0.0, 0.0};         ///< the direction in which the player looks, of any length
+  /// nullopt: by the unturned shape. AwayFromPlayer if most of its surface is on the side of the front (stairs),
+  /// AwayFromWall if most of it is at the back (a torch at a wall, a ladder), else TowardsPlayer (cubes).
+  std::optional<PlacedFront> front{};
+};
+
+/// Returns the state of a voxel that a player places: selects the type's orientation that fits the hit best, and keeps
+/// the other bits of `state`.
+///
+/// +Y matters first. If orientations turn it sideways (a torch, a log), it points away from the face that was hit, or at
+/// least along its axis. If they only turn it up or down (slabs, stairs), it points down below a ceiling and in the
+/// upper half of a side. Among equal ones, the front decides (PlacedFront); then the lowest value.
+///
+///   if (const auto hit = pick(tracer, camera, pixel)) {
+///     const PlacingHit at{.face = hit->face, .point = Vec3(hit->position - DVec3(hit->voxel)), .look = ray.direction};
+///     world.set(hit->voxel + normal_of(hit->face), stairs, {.state = placed_state(types[stairs], at)});
+///   }
+[[nodiscard]] std::uint32_t placed_state(const VoxelProperties& type, const PlacingHit& hit, std::uint32_t state = 0);
+
 /// Calls `visit` for each face of a type (`faces`, in the order of kDirections) and each face of its shapes that has a
 /// look of its own, in the order of parts, elements and kDirections. Equal textures occur several times.
 void for_each_look(const VoxelProperties& type, FunctionRef<void(const VoxelFace& look)> visit);

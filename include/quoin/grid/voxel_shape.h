@@ -126,6 +126,13 @@ struct StateOrientations {
   [[nodiscard]] bool empty() const { return by_value.empty(); }
   /// Returns the number of bits that select.
   [[nodiscard]] int bit_count() const;
+  /// Returns a state with the bits that select set to `value`, and the other bits as they were. Requires:
+  /// `value < by_value.size()`.
+  [[nodiscard]] std::uint32_t with_value(std::uint32_t state, std::size_t value) const {
+    QUOIN_ASSERT(value < by_value.size(), "value < by_value.size()");
+    const std::uint32_t mask = ((std::uint32_t{1} << bit_count()) - 1) << first_bit;
+    return (state & ~mask) | static_cast<std::uint32_t>(value) << first_bit;
+  }
   /// Returns the orientation of a state: the identity if there are none, or for a value without an orientation.
   [[nodiscard]] AxisOrientation of(std::uint32_t state) const {
     if (by_value.empty()) return {};

@@ -7,6 +7,9 @@
 #include <string>
 #include <utility>
 
+#include <glm/geometric.hpp>
+#include <quoin/grid/voxel_registry.h>
+
 namespace quoin {
 namespace {
 
@@ -171,9 +174,65 @@ std::uint32_t StateOrientations::turned(std::uint32_t state, const AxisOrientati
       best_fit = fit;
     }
   }
-  if (!best) return state;
-  const std::uint32_t mask = ((std::uint32_t{1} << bit_count()) - 1) << first_bit;
-  return (state & ~mask) | static_cast<std::uint32_t>(*best) << first_bit;
+  return best ? with_value(state, *best) : state;
+}
+
+namespace {
+
+// Returns the wanted direction of +Y after the turn: up or down, or away from the face that was hit if any orientation
+// turns +Y sideways.
+Direction up_of_placed(const StateOrientations& orientations, const PlacingHit& hit) {
+  const bool has_sideways = std::ranges::any_of(orientations.by_value, [](const AxisOrientation& orientation) {
+    return frame_of(orientation.apply(Direction::PosY)).axis != 1;
+  });
+  if (has_sideways || frame_of(hit.face).axis == 1) return hit.face;
+  return hit.point.y > 0.5F ? Direction::NegY : Direction::PosY;
+}
+
+// Returns the default of `PlacingHit::front`, by the middle of the surface of the unturned shape.
+PlacedFront front_of_shape(const VoxelProperties& type, std::uint32_t state) {
+  if (type.shapes.empty()) return PlacedFront::TowardsPlayer;
+  const ShapeModel& model = type.shapes.model(state, AxisOrientation(), {});
+  const FaceFrame& frame = frame_of(type.orientations.front);
+  float area = 0.0F;
+  float moment = 0.0F;  // about the middle of the voxel
+  for (const ModelFace& face : model.faces) {
+    const auto& c = face.corners;
+    const float share = glm::length(glm::cross(c[2] - c[0], c[3] - c[1]));
+    const float middle = (c[0][frame.axis] + c[1][frame.axis] + c[2][frame.axis] + c[3][frame.axis]) / 4.0F;
+    area += share;
+    moment += share * (middle - 0.5F) * static_cast<float>(frame.sign);
+  }
+  constexpr float kBalanced = 1.0F / 64.0F;  // voxels
+  if (std::abs(moment) <= kBalanced * area) return PlacedFront::TowardsPlayer;
+  return moment > 0.0F ? PlacedFront::AwayFromPlayer : PlacedFront::AwayFromWall;
+}
+
+}  // namespace
+
+std::uint32_t placed_state(const VoxelProperties& type, const PlacingHit& hit, std::uint32_t state) {
+  const StateOrientations& orientations = type.orientations;
+  if (orientations.empty()) return state;
+  const DVec3 up(normal_of(up_of_placed(orientations, hit)));
+  const PlacedFront wanted = hit.front.value_or(front_of_shape(type, state));
+  const double length = glm::length(hit.look);
+  DVec3 front = length > 0.0 && std::isfinite(length) ? hit.look / length : DVec3(0.0);
+  if (wanted != PlacedFront::AwayFromPlayer) front = -front;
+  const DVec3 wall(normal_of(hit.face));
+  if (wanted == PlacedFront::AwayFromWall && glm::dot(wall, up) == 0.0) front = wall;
+  std::size_t best = 0;
+  double best_fit = -1.0;
+  for (std::size_t value = 0; value < orientations.by_value.size(); ++value) {
+    const AxisOrientation& orientation = orientations.by_value[value];
+    // +Y matters most: the direction itself, then at least its axis, as for logs; then the front.
+    const double likeness = glm::dot(DVec3(normal_of(orientation.apply(Direction::PosY))), up);
+    const double fit = 4.0 * (2.0 * std::abs(likeness) + likeness) + 1.0 +
+                       glm::dot(DVec3(normal_of(orientation.apply(orientations.front))), front);
+    if (fit <= best_fit + 1e-9) continue;
+    best = value;
+    best_fit = fit;
+  }
+  return orientations.with_value(state, best);
 }
 
 }  // namespace quoin

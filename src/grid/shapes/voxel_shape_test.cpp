@@ -203,6 +203,79 @@ TEST(VoxelShape, StatesTurn) {
   EXPECT_EQ(furnace.turned(0, AxisOrientation::mirror(0)), 0U);
 }
 
+TEST(PlacedState, FollowsTheFaceOfTorchesAndLogs) {
+  VoxelProperties torch{.name = "torch", .state_bits = 4, .orientations = StateOrientations::to_directions(1)};
+  VoxelProperties log{.name = "log", .state_bits = 2, .orientations = StateOrientations::along_axes()};
+  for (const Direction face : kDirections) {
+    for (const Direction look : kDirections) {
+      const PlacingHit hit{.face = face, .look = 3.0 * DVec3(normal_of(look))};
+      const std::uint32_t state = placed_state(torch, hit, 0b1);
+      EXPECT_EQ(torch.orientations.of(state).apply(Direction::PosY), face);
+      EXPECT_EQ(state & 1U, 1U) << "a bit of another meaning stays";
+      const Direction along = log.orientations.of(placed_state(log, hit)).apply(Direction::PosY);
+      EXPECT_EQ(frame_of(along).axis, frame_of(face).axis);
+    }
+  }
+}
+
+TEST(PlacedState, TurnsFrontsByShapeAndPlayer) {
+  VoxelProperties furnace{.name = "furnace", .state_bits = 2, .orientations = StateOrientations::about_y()};
+  VoxelProperties steps = furnace;
+  steps.shapes = shapes_for_tests::stairs();
+  VoxelProperties torch = furnace;  // at a wall behind it
+  torch.shapes = *VoxelShape::from_elements(
+      {{.min = {-1, 3, 7}, .max = {1, 13, 9}, .turn = ElementTurn{.origin = {0, 3, 8}, .axis = 2, .degrees = -22.5F}}});
+  const auto front = [](const VoxelProperties& type, const PlacingHit& hit) {
+    return type.orientations.of(placed_state(type, hit)).apply(type.orientations.front);
+  };
+  for (const Direction way : {Direction::PosX, Direction::NegX, Direction::PosZ, Direction::NegZ}) {
+    const DVec3 look = DVec3(normal_of(way)) + DVec3(0.2, -0.7, 0.3);
+    const auto back = AxisOrientation::quarter_turns(1, 2).apply(way);
+    for (const Direction face : kDirections) {
+      PlacingHit hit{.face = face, .look = look};
+      EXPECT_EQ(front(furnace, hit), back);
+      EXPECT_EQ(front(steps, hit), way) << "the high side is away from the player";
+      EXPECT_EQ(front(torch, hit), frame_of(face).axis == 1 ? back : face);
+      hit.front = PlacedFront::AwayFromPlayer;
+      EXPECT_EQ(front(torch, hit), way);
+    }
+    furnace.orientations.front = Direction::NegZ;
+    EXPECT_EQ(front(furnace, {.face = Direction::PosY, .look = look}), back);
+    furnace.orientations.front = Direction::PosX;
+  }
+}
+
+TEST(PlacedState, PutsSlabsAndStairsIntoTheHalfThatWasHit) {
+  VoxelProperties slabs{.name = "slab", .state_bits = 1, .shapes = slab()};
+  slabs.orientations.by_value = {AxisOrientation(), AxisOrientation::quarter_turns(0, 2)};
+  VoxelProperties steps{.name = "stairs", .state_bits = 3, .shapes = shapes_for_tests::stairs()};
+  steps.orientations = StateOrientations::about_y_and_upside_down();
+  const auto is_upper = [&](Direction face, float height) {
+    const PlacingHit hit{.face = face, .point = {0.5F, height, 0.5F}, .look = {0.1, 0.3, -1.0}};
+    const std::uint32_t turned = placed_state(steps, hit);
+    EXPECT_EQ(steps.orientations.of(turned).apply(Direction::PosX), Direction::NegZ);
+    const std::uint32_t state = placed_state(slabs, hit);
+    EXPECT_EQ(state, turned >> 2U);
+    return state == 1;
+  };
+  EXPECT_FALSE(is_upper(Direction::PosY, 1.0F));
+  EXPECT_TRUE(is_upper(Direction::NegY, 0.0F));
+  for (const Direction side : {Direction::PosX, Direction::NegX, Direction::PosZ, Direction::NegZ}) {
+    EXPECT_FALSE(is_upper(side, 0.4F));
+    EXPECT_TRUE(is_upper(side, 0.6F));
+  }
+}
+
+TEST(PlacedState, ToleratesViewsWithoutDirectionAndTypesWithoutOrientations) {
+  const VoxelProperties stone{.name = "stone", .state_bits = 4};
+  EXPECT_EQ(placed_state(stone, {}, 9), 9U);
+  const VoxelProperties furnace{.name = "furnace", .state_bits = 2, .orientations = StateOrientations::about_y()};
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const DVec3& look : {DVec3(0.0), DVec3(nan, 0.0, 0.0), DVec3(0.0, -1.0, 0.0)}) {
+    EXPECT_EQ(placed_state(furnace, {.point = Vec3(static_cast<float>(nan)), .look = look}, 3), 0U);
+  }
+}
+
 TEST(ShapeAt, FencesConnectToFencesAndFullSides) {
   VoxelRegistry types;
   const VoxelType stone = *types.add({.name = "stone"});
