@@ -22,6 +22,7 @@ namespace {
 constexpr std::size_t kRoom = 1 << 14;  // bytes of memory for arrays
 constexpr int kMostCalls = 48;
 constexpr std::uint8_t kTextures = 250;  // the byte of calls for textures
+constexpr std::uint8_t kShapes = 249;    // the byte of calls for shapes, orientations and states
 constexpr std::uint8_t kLater = 251;     // the first byte of calls that were added later
 constexpr int kMostLongCalls = 1;        // the slowest calls: smooth voxels, path-traced images, maps of 2^24 voxels
 
@@ -169,6 +170,9 @@ class Program {
     std::memset(one.name, 'x', byte() % 2 == 0 ? 3 : sizeof one.name);
     one.transparent = byte() % 2;
     one.ior = bit() ? 0.0F : single();
+    // Reads no further bytes, so that programs of the corpus stay the same.
+    one.state_bits = one.rgba[0] % 34;
+    one.passable = one.rgba[1] % 2;
     std::uint16_t number = 0;
     took(quoin_type_add(handle(), perhaps(&one), perhaps(&number)));
   }
@@ -199,6 +203,108 @@ class Program {
     std::array<std::uint8_t, 5'000> rgba{};
     took(quoin_textures_read(from, index(), small(), perhaps(rgba.data()), rgba.size()));
     took(quoin_textures_faces(from, index(), perhaps(faces.data()), perhaps(&count)));
+  }
+
+  void shapes() {
+    std::array<quoin_shape_part, 2> parts{made<quoin_shape_part>(), sized<quoin_shape_part>()};
+    std::array<quoin_shape_element, 3> elements{made<quoin_shape_element>(), sized<quoin_shape_element>(),
+                                                sized<quoin_shape_element>()};
+    std::array<quoin_shape_condition, 2> conditions{made<quoin_shape_condition>(), sized<quoin_shape_condition>()};
+    auto look = made<quoin_face>();
+    look.alpha = byte() % 4;
+    look.has_tint = byte() % 2;
+    for (quoin_shape_part& part : parts) {
+      part.element_count = 1 + byte() % 3;
+      part.condition_count = byte() % 2;
+      part.orientation = bit() ? 0 : small();
+    }
+    for (quoin_shape_element& element : elements) {
+      for (int axis = 0; axis < 3; ++axis) {
+        element.min[axis] = bit() ? 0.0F : single();
+        element.max[axis] = bit() ? 16.0F : single();
+        element.turn_origin[axis] = bit() ? 8.0F : single();
+      }
+      element.has_turn = bit() ? 1 : 0;
+      element.turn_axis = byte() % 4;
+      element.turn_degrees = single();
+      element.turn_rescales = byte() % 2;
+      for (std::int32_t& side : element.looks) side = byte() % 8 == 0 ? small() : 0;
+      element.has_parts = byte();
+      for (auto& part : element.parts) part[byte() % 4] = single();
+    }
+    for (quoin_shape_condition& condition : conditions) {
+      condition.state_mask = byte() % 4;
+      condition.connected = byte() % 65;
+      condition.corner = byte() % 7;
+    }
+    auto given = made<quoin_shapes>();
+    given.parts = perhaps(parts.data());
+    given.part_count = byte() % 3;
+    given.elements = perhaps(elements.data());
+    given.element_count = byte() % 4;
+    given.conditions = perhaps(conditions.data());
+    given.condition_count = byte() % 3;
+    given.looks = perhaps(&look);
+    given.look_count = byte() % 2;
+    given.neighbours = byte() % 5;
+    given.groups = byte();
+    const quoin_scene scene = handle();
+    const std::size_t type = index();
+    took(quoin_type_set_shapes(scene, type, perhaps(&given)));
+    auto properties = made<quoin_type>();
+    properties.rgba[3] = byte();
+    properties.blocks_light = byte() % 4 - 1;
+    properties.state_bits = byte() % 34;
+    took(quoin_type_set(scene, type, perhaps(&properties)));
+    orientations(scene, type);
+    read_shapes(type, parts[0], elements[0], conditions[0], look);
+    states(scene);
+  }
+
+  void orientations(quoin_scene scene, std::size_t type) {
+    auto given = made<quoin_orientations>();
+    given.kind = byte() % 6;
+    given.first_bit = small();
+    given.front = byte() % 7;
+    given.count = byte() % 50;
+    for (std::uint8_t& each : given.by_value) each = byte() % 49;
+    took(quoin_type_set_orientations(scene, type, perhaps(&given)));
+    took(quoin_type_get_orientations(scene, type, perhaps(&given)));
+    std::int32_t turned = 0;
+    took(quoin_orientation_turn(small(), byte() % 4, static_cast<std::int32_t>(whole()), perhaps(&turned)));
+    std::uint32_t state = 0;
+    took(quoin_type_turned_state(scene, type, byte(), small(), perhaps(&state)));
+    auto placing = made<quoin_placing>();
+    placing.face = byte() % 7;
+    placing.front = byte() % 5;
+    placing.point[1] = single();
+    numbers(placing.look);
+    took(quoin_type_placed_state(scene, type, perhaps(&placing), byte(), perhaps(&state)));
+  }
+
+  void read_shapes(std::size_t type, const quoin_shape_part& part, const quoin_shape_element& element,
+                   const quoin_shape_condition& condition, const quoin_face& look) {
+    auto whole = made<quoin_shapes>();
+    const quoin_textures from = bit() ? textures_ : handle();
+    took(quoin_textures_shapes(from, type, perhaps(&whole)));
+    auto counts = sized<quoin_shapes>();
+    if (quoin_textures_shapes(from, type, &counts) != QUOIN_OK) counts = sized<quoin_shapes>();
+    std::vector<quoin_shape_part> parts(counts.part_count + 1, part);
+    std::vector<quoin_shape_element> elements(counts.element_count + 1, element);
+    std::vector<quoin_shape_condition> conditions(counts.condition_count + 1, condition);
+    std::vector<quoin_face> looks(counts.look_count + 1, look);
+    took(quoin_textures_read_shapes(from, type, perhaps(parts.data()), perhaps(elements.data()),
+                                    perhaps(conditions.data()), perhaps(looks.data())));
+  }
+
+  void states(quoin_scene scene) {
+    const std::array<std::int32_t, 3> min{small(), small(), small()};
+    const std::array<std::int32_t, 3> shape{8, byte() % 9, 8};
+    std::array<std::uint32_t, 512> states{};
+    took(quoin_grid_read_states(scene, index(), perhaps(min.data()), shape.data(), perhaps(states.data()),
+                                states.size()));
+    const quoin_array given = array();
+    took(quoin_grid_write_states(scene, index(), perhaps(&given)));
   }
 
   void instance() {
@@ -471,6 +577,7 @@ class Program {
   void step() {
     quoin_scene scene = 0;
     const std::uint8_t which = byte();
+    if (which == kShapes) return shapes();
     if (which == kTextures) return textures();
     if (which >= kLater) return step_of_later(which);
     switch (which % 14) {

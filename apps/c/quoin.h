@@ -27,8 +27,9 @@ extern "C" {
 #define QUOIN_API
 #endif
 
-/* Initialises a struct of `type`: sets `size`, and all other fields to 0: their default. Set three fields
- * yourself: quoin_type alpha (0: invisible), quoin_type roughness (0: a mirror), quoin_instance visible (0: hidden). */
+/* Initialises a struct of `type`: sets `size`, and all other fields to 0: their default. Set four fields yourself:
+ * quoin_type alpha (0: invisible), quoin_type roughness (0: a mirror), quoin_instance visible (0: hidden), and
+ * quoin_shapes groups (0: connects to no other type). */
 #define QUOIN_INIT(type) \
   { .size = sizeof(type) }
 
@@ -103,6 +104,9 @@ typedef struct quoin_type {
    * corners of faces; a transparent type cannot. */
   int32_t blocks_light;
   int32_t occludes;
+  int32_t reserved;   /* ignored; was padding in earlier versions */
+  int32_t state_bits; /* number of bits of its voxels' states, from the lowest bit up, 0 to 32 */
+  int32_t passable;   /* 1: does not stop moving bodies */
 } quoin_type;
 
 enum {
@@ -136,6 +140,126 @@ typedef struct quoin_texture_array {
   int32_t levels; /* of mipmaps, down to one texel: 5 for 16 texels */
   size_t layers;
 } quoin_texture_array;
+
+/* Directions are numbered 0 (+X), 1 (-X), 2 (+Y), 3 (-Y), 4 (+Z) and 5 (-Z). Orientations turn by multiples of 90
+ * degrees, and can mirror. Their numbers, 0 to 47, are 8 * order, plus 1, 2 and 4 if the turned x, y and z are negated.
+ * order has the axes that become x, y and z: 0 xyz, 1 yzx, 2 zxy, 3 yxz, 4 xzy, 5 zyx. 0 turns nothing;
+ * quoin_orientation_turn gives the others. */
+
+enum {
+  QUOIN_ORIENTATIONS_LISTED = 0,                 /* those of by_value */
+  QUOIN_ORIENTATIONS_ABOUT_Y = 1,                /* 0, 1, 2 and 3 quarter turns about y: a furnace */
+  QUOIN_ORIENTATIONS_ALONG_AXES = 2,             /* +Y to +Y, +X and +Z: a log */
+  QUOIN_ORIENTATIONS_TO_DIRECTIONS = 3,          /* +Y to +X, -X, +Y, -Y, +Z and -Z: a torch at any face */
+  QUOIN_ORIENTATIONS_ABOUT_Y_AND_UPSIDE_DOWN = 4 /* four turns about y, then the same upside down: stairs */
+};
+
+/* The orientations that a type's state selects. They turn faces and shapes. */
+typedef struct quoin_orientations {
+  size_t size;
+  int32_t kind;      /* QUOIN_ORIENTATIONS_...; except LISTED, it sets by_value and count */
+  int32_t first_bit; /* the lowest bit of the state that selects */
+  int32_t front; /* the direction of its front before it is turned: the door of a furnace, the high side of stairs */
+  int32_t count; /* 0: never turned; at most 48 */
+  uint8_t by_value[48]; /* by the value of the state's bits */
+} quoin_orientations;
+
+enum {
+  QUOIN_LOOK_NONE = -1,  /* the side is not drawn */
+  QUOIN_LOOK_OF_TYPE = 0 /* the type's face of the side's direction, or the type's colour */
+};
+
+/* A box of a shape, with a look per side. Lengths are sixteenths: a voxel spans 0 to 16 on each axis, and a box may
+ * reach from -16 to 32, also after its turn. */
+typedef struct quoin_shape_element {
+  size_t size;
+  float min[3], max[3]; /* equal along one axis: a plate */
+  int32_t has_turn;
+  int32_t turn_axis;     /* 0 x, 1 y, 2 z */
+  float turn_degrees;    /* counter-clockwise, seen from the positive end of the axis */
+  float turn_origin[3];  /* a point of the axis */
+  int32_t turn_rescales; /* 1: stretches the box across the axis by 1 / cos(turn_degrees) */
+  int32_t passable;      /* 1: bodies pass */
+  int32_t looks[6];   /* by direction, before the turn: QUOIN_LOOK_..., or the number in quoin_shapes.looks, from 1 */
+  uint32_t has_parts; /* a bit per direction; 0: the part of the texture that a full cube shows at this place */
+  float parts[6][4];  /* left, top, right, bottom of the part of the texture, in sixteenths */
+  int32_t reserved;   /* ignored */
+} quoin_shape_element;
+
+/* A condition of a voxel's state and neighbours. Directions are those of the unturned type. */
+typedef struct quoin_shape_condition {
+  size_t size;
+  uint32_t state_mask;  /* the bits of the state that are compared */
+  uint32_t state;       /* their values */
+  uint32_t connected;   /* a bit per direction: sides with a connection */
+  uint32_t unconnected; /* sides without one */
+  int32_t corner;       /* QUOIN_CORNER_... */
+  int32_t reserved;     /* ignored */
+} quoin_shape_condition;
+
+enum { /* the corner that stairs form with their neighbours; left and right of a person who walks up */
+       QUOIN_CORNER_ANY = 0,
+       QUOIN_CORNER_STRAIGHT = 1,
+       QUOIN_CORNER_OUTER_LEFT = 2,
+       QUOIN_CORNER_OUTER_RIGHT = 3,
+       QUOIN_CORNER_INNER_LEFT = 4,
+       QUOIN_CORNER_INNER_RIGHT = 5
+};
+
+/* A part of a type's shape: the next elements and conditions of quoin_shapes. It is present if any of its conditions
+ * holds, and always if it has none. */
+typedef struct quoin_shape_part {
+  size_t size;
+  size_t element_count; /* 1 to 128 */
+  size_t condition_count;
+  int32_t orientation; /* turns the part, before the state's orientation */
+  int32_t reserved;    /* ignored */
+} quoin_shape_part;
+
+enum {
+  QUOIN_NEIGHBOURS_NONE = 0,
+  QUOIN_NEIGHBOURS_CONNECTED = 1, /* fences, panes: connected to types of a common group, and to full sides */
+  QUOIN_NEIGHBOURS_STAIRS = 2,    /* stairs whose unturned high side is at +X form corners */
+  QUOIN_NEIGHBOURS_FLUID =
+      3 /* needs no parts. State bits 0 to 2: the level, 0 is a source; bit 3: falls, fills its voxel */
+};
+
+/* The shapes of a type. `size` is set in each element of the arrays. */
+typedef struct quoin_shapes {
+  size_t size;
+  const quoin_shape_part* parts;
+  size_t part_count;                       /* at most 64 */
+  const quoin_shape_element* elements;     /* of all parts, one after another */
+  size_t element_count;                    /* at most 512 */
+  const quoin_shape_condition* conditions; /* of all parts, one after another */
+  size_t condition_count;
+  /* Looks that sides refer to by number. Without texels (rgba null, texels 0), a look has the colour of its tint. */
+  const quoin_face* looks;
+  size_t look_count;
+  int32_t neighbours;         /* QUOIN_NEIGHBOURS_... */
+  uint32_t groups;            /* a bit per group: types with a common bit connect. Set it: usually 1 */
+  int32_t ignores_full_sides; /* 1: does not connect to sides of other types that are covered wholly */
+  int32_t reserved;           /* ignored */
+} quoin_shapes;
+
+enum { /* rules for the front of a placed voxel */
+       QUOIN_FRONT_BY_SHAPE =
+           0, /* AWAY_FROM_PLAYER for stairs, AWAY_FROM_WALL for torches at a wall, else TOWARDS_PLAYER */
+       QUOIN_FRONT_TOWARDS_PLAYER = 1,
+       QUOIN_FRONT_AWAY_FROM_PLAYER = 2,
+       QUOIN_FRONT_AWAY_FROM_WALL =
+           3 /* the direction of the face that was hit, if it is a side; else towards the player */
+};
+
+/* The face of a voxel at which a player places another voxel. Vectors are in the grid's space. */
+typedef struct quoin_placing {
+  size_t size;
+  int32_t face;     /* the direction of the face */
+  int32_t front;    /* QUOIN_FRONT_... */
+  float point[3];   /* the point that was hit, in voxels from the hit voxel's minimum corner */
+  int32_t reserved; /* ignored */
+  double look[3];   /* the direction in which the player looks, of any length */
+} quoin_placing;
 
 /* One placement of a grid in the world. */
 typedef struct quoin_instance {
@@ -220,8 +344,8 @@ typedef struct quoin_mesh_data {
   const uint32_t* indices; /* three per triangle, counter-clockwise seen from outside */
   /* [interface_count][4]: back label, front label, first index, index count; for labels. */
   const int64_t* interfaces;
-  /* [vertex_count], for grids meshed as blocks. Blocks come first, with four vertices and six indices per face
-   * (watertight: possibly more). The surfaces of fields follow, with type 0. */
+  /* [vertex_count], for grids meshed as blocks. Blocks come first, with four vertices and six indices per face, also
+   * of shapes (watertight: possibly more). The surfaces of fields follow, with type 0. */
   const uint16_t* types;
   /* For grids meshed as blocks, if any type of the scene has faces or shapes. A face shows tint times texture. */
   const uint32_t* textures; /* [vertex_count]: numbers as in quoin_face; QUOIN_NO_TEXTURE: the tint is the colour */
@@ -369,11 +493,34 @@ QUOIN_API quoin_status quoin_scene_warning(quoin_scene scene, size_t index, char
 QUOIN_API quoin_status quoin_type_count(quoin_scene scene, size_t* out);
 QUOIN_API quoin_status quoin_type_get(quoin_scene scene, size_t index, quoin_type* out);
 QUOIN_API quoin_status quoin_type_add(quoin_scene scene, const quoin_type* type, uint16_t* out);
+/* Replaces the properties of a type. Its faces, orientations and shapes stay. Set the blocks_light of a type with
+ * shapes after its shapes: by default, shapes let light through where they leave a side open. */
+QUOIN_API quoin_status quoin_type_set(quoin_scene scene, size_t index, const quoin_type* type);
 
 /* Sets the textures of a type: six faces, in the order +X, -X, +Y, -Y, +Z, -Z. `size` is set in each element. Copies
  * the texels. The type's colour becomes the mean of its faces. An opaque type has opaque faces; cutout and translucent
  * faces need a transparent type. Null removes the textures, and the type keeps its colour. */
 QUOIN_API quoin_status quoin_type_set_faces(quoin_scene scene, size_t type, const quoin_face* faces);
+
+/* Gets or sets the orientations that a type's state selects. The type's state_bits must contain their bits. Null: the
+ * type is never turned. */
+QUOIN_API quoin_status quoin_type_get_orientations(quoin_scene scene, size_t type, quoin_orientations* out);
+QUOIN_API quoin_status quoin_type_set_orientations(quoin_scene scene, size_t type,
+                                                   const quoin_orientations* orientations);
+/* Turns an orientation further, by quarter turns about an axis (0 x, 1 y, 2 z): counter-clockwise, seen from the
+ * positive end of the axis. */
+QUOIN_API quoin_status quoin_orientation_turn(int32_t orientation, int32_t axis, int32_t quarter_turns, int32_t* out);
+/* Gets the state of a voxel after it was turned, such as in a copy. Other bits stay as they were. */
+QUOIN_API quoin_status quoin_type_turned_state(quoin_scene scene, size_t type, uint32_t state, int32_t orientation,
+                                               uint32_t* out);
+/* Gets the state with which a player places a voxel of a type: the orientation that fits the face best, with the other
+ * bits of `state`. Torches point away from the face, slabs and stairs go into the half that was hit, fronts follow the
+ * player. */
+QUOIN_API quoin_status quoin_type_placed_state(quoin_scene scene, size_t type, const quoin_placing* placing,
+                                               uint32_t state, uint32_t* out);
+/* Sets the shapes of a type, which state and neighbours select; null: the type is a cube. Copies the arrays. The type's
+ * `transparent` is that of the material: stairs of stone are opaque. Errors name the part and the element. */
+QUOIN_API quoin_status quoin_type_set_shapes(quoin_scene scene, size_t type, const quoin_shapes* shapes);
 
 /* Numbers the textures of all types, each once, as layers of arrays: one array per size, and more if a size has more
  * textures than `max_layers`, the limit of a device (0: 2,048). Later changes of the scene do not affect the result.
@@ -389,6 +536,14 @@ QUOIN_API quoin_status quoin_textures_read(quoin_textures textures, size_t array
 /* Gets the six faces of a type, and their number, 6, or 0 for a type without textures. Set the size of the first
  * element of `out`: it is the size of each. */
 QUOIN_API quoin_status quoin_textures_faces(quoin_textures textures, size_t type, quoin_face* out, size_t* count);
+/* Gets the shapes of a type: all fields except the arrays, which are null. A cube has no parts and neighbours of
+ * QUOIN_NEIGHBOURS_NONE. */
+QUOIN_API quoin_status quoin_textures_shapes(quoin_textures textures, size_t type, quoin_shapes* out);
+/* Copies the arrays of a type's shapes, which have the counts that quoin_textures_shapes gives. Set the size of each
+ * array's first element: it is the size of each. Null arrays are not filled. Equal looks of a type have one number. */
+QUOIN_API quoin_status quoin_textures_read_shapes(quoin_textures textures, size_t type, quoin_shape_part* parts,
+                                                  quoin_shape_element* elements, quoin_shape_condition* conditions,
+                                                  quoin_face* looks);
 
 /* Grids, by number. */
 QUOIN_API quoin_status quoin_grid_count(quoin_scene scene, size_t* out);
@@ -400,6 +555,16 @@ QUOIN_API quoin_status quoin_grid_read(quoin_scene scene, size_t grid, const int
 /* Adds a grid from an array of types (QUOIN_UINT8 or QUOIN_UINT16), which must exist in the scene. Places it at
  * array->origin, rounded down to whole voxels. `name` may be null. `out` receives the grid's number and may be null. */
 QUOIN_API quoin_status quoin_grid_add(quoin_scene scene, const quoin_array* array, const char* name, size_t* out);
+
+/* Every voxel except air has a state, 32 bits, 0 by default. The type decides what it means: orientations and shapes
+ * select by it. Setting a voxel to another type makes its state 0; setting it to the same type keeps the state. */
+
+/* Writes the states of a box into uint32_t out[capacity]; otherwise as quoin_grid_read. */
+QUOIN_API quoin_status quoin_grid_read_states(quoin_scene scene, size_t grid, const int32_t min[3],
+                                              const int32_t shape[3], uint32_t* out, size_t capacity);
+/* Replaces the states of a box with an array of QUOIN_UINT8, QUOIN_UINT16 or QUOIN_UINT32, otherwise as
+ * quoin_grid_write. Air ignores them. If a state has bits beyond its type's state_bits, nothing changes. */
+QUOIN_API quoin_status quoin_grid_write_states(quoin_scene scene, size_t grid, const quoin_array* array);
 
 /* Sets how world files (.quoin) store a grid: the fields `unsaved` and `whole` of quoin_grid_info. */
 QUOIN_API quoin_status quoin_grid_set_storage(quoin_scene scene, size_t grid, int32_t unsaved, int32_t whole);

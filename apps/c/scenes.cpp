@@ -1,13 +1,14 @@
-// Scenes, their types and their grids.
+// Scenes and their grids.
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <quoin/grid/connected.h>
 #include <quoin/grid/mass.h>
@@ -51,10 +52,24 @@ VoxelType type_at(const quoin_array& array, std::int64_t x, std::int64_t y, std:
   return type;
 }
 
-const char* validate_array(const quoin_array& array) {
+std::uint32_t state_at(const quoin_array& array, std::int64_t x, std::int64_t y, std::int64_t z) {
+  if (array.scalar != QUOIN_UINT32) return type_at(array, x, y, z);
+  std::uint32_t state = 0;
+  std::memcpy(
+      &state,
+      static_cast<const std::byte*>(array.data) + x * array.strides[0] + y * array.strides[1] + z * array.strides[2],
+      sizeof state);
+  return state;
+}
+
+enum class Holds : std::uint8_t { Types, States };
+
+const char* validate_array(const quoin_array& array, Holds holds = Holds::Types) {
   if (array.data == nullptr) return "the array's data is null";
-  if (array.scalar != QUOIN_UINT8 && array.scalar != QUOIN_UINT16)
-    return "an array of types must be QUOIN_UINT8 or QUOIN_UINT16";
+  const bool is_small = array.scalar == QUOIN_UINT8 || array.scalar == QUOIN_UINT16;
+  if (holds == Holds::Types && !is_small) return "an array of types must be QUOIN_UINT8 or QUOIN_UINT16";
+  if (holds == Holds::States && !is_small && array.scalar != QUOIN_UINT32)
+    return "an array of states must be QUOIN_UINT8, QUOIN_UINT16 or QUOIN_UINT32";
   for (int axis = 0; axis < 3; ++axis) {
     if (array.shape[axis] <= 0 || array.shape[axis] > kFurthestVoxel) return "the array's shape is out of range";
     if (!(std::abs(array.origin[axis]) < static_cast<double>(kFurthestVoxel) / 2.0))
@@ -116,6 +131,59 @@ quoin_status write_grid(SceneBody& scene, GridHandle grid, const quoin_array& ar
     IVec3 at = first - min;
     for (VoxelType& type : row) type = type_at(array, at.x++, at.y, at.z);
   });
+  return QUOIN_OK;
+}
+
+// Check all states first: if a type lacks the bits of one, nothing changes.
+quoin_status write_states(SceneBody& scene, GridHandle handle, const quoin_array& array) {
+  const VoxelRegistry& types = scene.loaded.scene.types;
+  const Grid& before = scene.loaded.scene.grids()[handle].grid;
+  const IVec3 min(floor(DVec3(array.origin[0], array.origin[1], array.origin[2])));
+  std::vector<std::pair<IVec3, std::uint32_t>> changes;
+  GridReader reader(before);
+  for (std::int64_t z = 0; z < array.shape[2]; ++z) {
+    for (std::int64_t y = 0; y < array.shape[1]; ++y) {
+      for (std::int64_t x = 0; x < array.shape[0]; ++x) {
+        const IVec3 voxel = min + IVec3(x, y, z);
+        const VoxelType type = reader.get(voxel.x, voxel.y, voxel.z);
+        if (type == kAir) continue;
+        const std::uint32_t state = state_at(array, x, y, z);
+        const int bits = type < types.size() ? types[type].state_bits : 0;
+        if (bits < kMaxStateBits && state >> bits != 0) {
+          return fail(QUOIN_INVALID_ARGUMENT, ("the array has the state " + std::to_string(state) + ", but type " +
+                                               std::to_string(type) + " has " + std::to_string(bits) + " state bits")
+                                                  .c_str());
+        }
+        if (before.data(voxel).state != state) changes.emplace_back(voxel, state);
+      }
+    }
+  }
+  if (changes.empty()) return QUOIN_OK;
+  Grid& grid = scene.loaded.scene.edit(handle).grid;
+  for (const auto& [voxel, state] : changes)
+    grid.set(voxel, grid.get(voxel), {.state = state, .bytes = grid.data(voxel).bytes});
+  return QUOIN_OK;
+}
+
+// Calls `write(index, x, y, z)` for each voxel of a box, in the order x, y, z of the grid: `index` is that of an array
+// whose slowest axis is x. Fails if the array is too small.
+template <class Write>
+quoin_status read_box(const std::int32_t min[3], const std::int32_t shape[3], std::size_t capacity, Write&& write) {
+  if (!is_in_range(min, shape)) return fail(QUOIN_INVALID_ARGUMENT, "the box is out of range");
+  std::size_t left = capacity;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (shape[axis] == 0) return QUOIN_OK;
+    left /= static_cast<std::size_t>(shape[axis]);
+  }
+  if (left == 0) return fail(QUOIN_INVALID_ARGUMENT, "the array is too small for the box");
+  // x is the array's slowest axis but the grid's fastest: read whole runs along x.
+  const auto plane = static_cast<std::size_t>(shape[1]) * static_cast<std::size_t>(shape[2]);
+  for (std::int32_t z = 0; z < shape[2]; ++z) {
+    for (std::int32_t y = 0; y < shape[1]; ++y) {
+      std::size_t to = static_cast<std::size_t>(y) * static_cast<std::size_t>(shape[2]) + static_cast<std::size_t>(z);
+      for (std::int32_t x = 0; x < shape[0]; ++x, to += plane) write(to, min[0] + x, min[1] + y, min[2] + z);
+    }
+  }
   return QUOIN_OK;
 }
 
@@ -197,73 +265,6 @@ const char* validate_load_options(const quoin_load_options& options) {
   if (options.raw_scalar < QUOIN_UINT8 || options.raw_scalar > QUOIN_FLOAT64) return "no scalar has this number";
   if (is_raw(options) && options.heights != QUOIN_HEIGHTS_NONE) return "both raw_shape and heights are set";
   return validate_heights(options);
-}
-
-const char* validate_face(const quoin_face& face) {
-  if (face.rgba == nullptr) return "the texels of a face are null";
-  if (face.texels < kMinTextureSize || face.texels > kMaxTextureSize ||
-      !std::has_single_bit(static_cast<unsigned>(face.texels)))
-    return "the texels per side of a face must be 16, 32, 64, 128, 256, 512 or 1024";
-  if (face.turn < 0 || face.turn > 3) return "the turn of a face must be 0 to 3";
-  if (face.alpha < QUOIN_FACE_OPAQUE || face.alpha > QUOIN_FACE_TRANSLUCENT)
-    return "the alpha of a face is not a QUOIN_FACE value";
-  return nullptr;
-}
-
-Result<VoxelFace> face_of(const quoin_face& given) {
-  if (const char* wrong = validate_face(given)) return make_error(ErrorCode::InvalidArgument, wrong);
-  const std::size_t bytes = std::size_t{4} * given.texels * given.texels;
-  auto texture =
-      Texture::from_image(text_in(given.name), {given.texels, given.texels, {given.rgba, given.rgba + bytes}});
-  if (!texture) return texture.error();
-  VoxelFace face{std::move(*texture)};
-  face.turn = static_cast<std::uint8_t>(given.turn);
-  face.mirrored = given.mirrored != 0;
-  face.alpha = static_cast<FaceAlpha>(given.alpha);
-  if (given.has_tint != 0) face.tint = {given.tint[0], given.tint[1], given.tint[2], 255};
-  return face;
-}
-
-// Reads six faces. The `size` of each one gives the position of the next.
-Result<VoxelFaces> faces_of(const quoin_face* faces) {
-  std::array<VoxelFace, 6> made;
-  const auto* at = reinterpret_cast<const std::byte*>(faces);
-  for (VoxelFace& each : made) {
-    const auto given = taken(reinterpret_cast<const quoin_face*>(at));
-    if (!given) return make_error(ErrorCode::InvalidArgument, "invalid size of a face");
-    auto face = face_of(*given);
-    if (!face) return face.error();
-    each = std::move(*face);
-    at += given->size;
-  }
-  return VoxelFaces(made);
-}
-
-quoin_face described(const VoxelFace& face, const TextureSet& set) {
-  quoin_face made{};
-  copy_text(face.texture.name(), made.name);
-  made.rgba = reinterpret_cast<const std::uint8_t*>(face.texture.level(0).data());
-  made.texels = face.texture.size();
-  made.turn = face.turn;
-  made.mirrored = face.mirrored ? 1 : 0;
-  made.alpha = static_cast<std::int32_t>(face.alpha);
-  made.has_tint = face.tint.r == 255 && face.tint.g == 255 && face.tint.b == 255 ? 0 : 1;
-  const std::uint8_t tint[] = {face.tint.r, face.tint.g, face.tint.b, 255};
-  std::memcpy(made.tint, tint, sizeof tint);
-  const auto layer = set.find(face.texture);
-  const bool is_numbered = layer && layer->array <= 0xFFFFU && layer->layer <= 0xFFFFU;
-  made.texture = is_numbered ? layer->array << 16U | layer->layer : QUOIN_NO_TEXTURE;
-  return made;
-}
-
-// Runs `work` with textures, which never change.
-template <class Work>
-quoin_status with_textures(quoin_textures handle, Work&& work) noexcept {
-  return guarded([&] {
-    const auto textures = handles().find<const TexturesBody>(handle);
-    if (textures == nullptr) return fail(QUOIN_BAD_HANDLE, "no textures have this handle");
-    return work(*textures);
-  });
 }
 
 // The densities of voxel types that a caller gives; null: 1 for all.
@@ -362,45 +363,6 @@ Result<LoadOptions> load_options_of(const quoin_load_options* given) {
   return options_of(*whole);
 }
 
-const char* validate_type(const quoin_type& type) {
-  const auto is_share = [](float x) { return x >= 0.0F && x <= 1.0F; };
-  const auto is_amount = [](float x) { return x >= 0.0F && std::isfinite(x); };
-  if (!is_share(type.metalness) || !is_share(type.roughness) || !is_amount(type.emission))
-    return "emission, metalness or roughness out of range";
-  if (!is_amount(type.ior) || !is_amount(type.scattering) || !is_share(std::abs(type.anisotropy)))
-    return "index of refraction, scattering or anisotropy out of range";
-  const auto is_sign = [](std::int32_t x) { return x >= -1 && x <= 1; };
-  if (type.light_cost < 0 || type.light_cost > kMaxLightCost || !is_sign(type.blocks_light) || !is_sign(type.occludes))
-    return "light_cost, blocks_light or occludes out of range";
-  if (type.occludes > 0 && (type.transparent != 0 || type.rgba[3] < 255)) return "a transparent type cannot occlude";
-  return nullptr;
-}
-
-// Conversions of 1 (yes), -1 (no) and 0 (default).
-std::optional<bool> own_flag(std::int32_t sign) {
-  return sign == 0 ? std::nullopt : std::optional(sign > 0);
-}
-std::int32_t sign_of(std::optional<bool> flag) {
-  return !flag ? 0 : *flag ? 1 : -1;
-}
-
-VoxelProperties properties_of(const quoin_type& type) {
-  VoxelProperties properties;
-  properties.colour = {type.rgba[0], type.rgba[1], type.rgba[2], type.rgba[3]};
-  if (type.rgba[3] < 255 || type.transparent != 0) properties.visibility = Visibility::Transparent;
-  properties.emission = type.emission;
-  properties.metalness = type.metalness;
-  properties.roughness = type.roughness;
-  if (type.ior != 0.0F) properties.ior = type.ior;
-  properties.scattering = type.scattering;
-  properties.anisotropy = type.anisotropy;
-  properties.light_cost = static_cast<std::uint8_t>(type.light_cost);
-  properties.blocks_light = own_flag(type.blocks_light);
-  properties.occludes = own_flag(type.occludes);
-  properties.name = text_in(type.name);
-  return properties;
-}
-
 void copy_text(std::string_view text, char* to, std::size_t capacity) {
   std::size_t length = std::min(text.size(), capacity - 1);
   while (length < text.size() && length > 0 && (static_cast<unsigned char>(text[length]) & 0xC0U) == 0x80U) --length;
@@ -492,128 +454,6 @@ quoin_status quoin_scene_warning(quoin_scene scene, std::size_t index, char* tex
   });
 }
 
-quoin_status quoin_type_count(quoin_scene scene, std::size_t* out) {
-  return report_count(scene, out, [](SceneBody& body) { return body.loaded.scene.types.size(); });
-}
-
-quoin_status quoin_type_get(quoin_scene scene, std::size_t index, quoin_type* out) {
-  const auto count = [](SceneBody& body) { return body.loaded.scene.types.size(); };
-  return report_item(scene, index, out, count, [&](SceneBody& body, quoin_type& type) {
-    const VoxelProperties& found = body.loaded.scene.types[static_cast<VoxelType>(index)];
-    const bool is_opaque = found.visibility == Visibility::Opaque;
-    const std::uint8_t alpha = index == kAir ? 0 : is_opaque ? 255 : found.colour.a;
-    const std::uint8_t rgba[] = {found.colour.r, found.colour.g, found.colour.b, alpha};
-    std::memcpy(type.rgba, rgba, sizeof rgba);
-    type.emission = found.emission;
-    type.metalness = found.metalness;
-    type.roughness = found.roughness;
-    type.transparent = found.visibility == Visibility::Transparent ? 1 : 0;
-    type.ior = found.ior;
-    type.scattering = found.scattering;
-    type.anisotropy = found.anisotropy;
-    type.light_cost = found.light_cost;
-    type.blocks_light = sign_of(found.blocks_light);
-    type.occludes = sign_of(found.occludes);
-    copy_text(found.name, type.name);
-  });
-}
-
-quoin_status quoin_type_add(quoin_scene scene, const quoin_type* type, std::uint16_t* out) {
-  return with_scene(scene, Use::Change, [&](SceneBody& body) {
-    const auto given = taken(type);
-    if (!given || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "type or out is null, or the type's size");
-    if (const char* wrong = validate_type(*given)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
-    const auto added = body.loaded.scene.types.add(properties_of(*given));
-    if (!added) return fail(added.error());
-    *out = *added;
-    return QUOIN_OK;
-  });
-}
-
-quoin_status quoin_type_set_faces(quoin_scene scene, std::size_t type, const quoin_face* faces) {
-  return with_scene(scene, Use::Change, [&](SceneBody& body) {
-    VoxelRegistry& types = body.loaded.scene.types;
-    if (type == kAir || type >= types.size()) return fail(QUOIN_INVALID_ARGUMENT, "no type has this number");
-    const auto number = static_cast<VoxelType>(type);
-    VoxelProperties changed = types[number];
-    changed.faces = {};
-    if (faces != nullptr) {
-      auto given = faces_of(faces);
-      if (!given) return fail(given.error());
-      changed.faces = std::move(*given);
-    }
-    if (Status valid = quoin::validate_type(changed); !valid) return fail(valid.error());
-    types.replace(number, std::move(changed));
-    return QUOIN_OK;
-  });
-}
-
-quoin_status quoin_scene_textures(quoin_scene scene, std::size_t max_layers, quoin_textures* out) {
-  return with_scene(scene, Use::Read, [&](SceneBody& body) {
-    if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
-    TexturesBody made{body.loaded.scene.types, max_layers == 0 ? TextureSet() : TextureSet(max_layers)};
-    made.set.add(made.types);
-    *out = handles().put(std::make_shared<const TexturesBody>(std::move(made)));
-    return QUOIN_OK;
-  });
-}
-
-quoin_status quoin_textures_array_count(quoin_textures textures, std::size_t* out) {
-  return with_textures(textures, [&](const TexturesBody& body) {
-    if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
-    *out = body.set.arrays().size();
-    return QUOIN_OK;
-  });
-}
-
-quoin_status quoin_textures_array_get(quoin_textures textures, std::size_t index, quoin_texture_array* out) {
-  return with_textures(textures, [&](const TexturesBody& body) {
-    if (index >= body.set.arrays().size()) return fail(QUOIN_INVALID_ARGUMENT, "no array has this number");
-    const TextureSet::Array& found = body.set.arrays()[index];
-    quoin_texture_array array{};
-    array.texels = found.size;
-    array.levels = found.layers.front().level_count();
-    array.layers = found.layers.size();
-    return report(array, out);
-  });
-}
-
-quoin_status quoin_textures_read(quoin_textures textures, std::size_t array, std::int32_t level, std::uint8_t* rgba,
-                                 std::size_t capacity) {
-  return with_textures(textures, [&](const TexturesBody& body) {
-    if (rgba == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "rgba is null");
-    if (array >= body.set.arrays().size()) return fail(QUOIN_INVALID_ARGUMENT, "no array has this number");
-    const std::vector<Texture>& layers = body.set.arrays()[array].layers;
-    if (level < 0 || level >= layers.front().level_count())
-      return fail(QUOIN_INVALID_ARGUMENT, "no mipmap level has this number");
-    const std::size_t bytes = layers.front().level(level).size_bytes();
-    if (capacity / bytes < layers.size())
-      return fail(QUOIN_INVALID_ARGUMENT, "the array is too small for the textures");
-    for (const Texture& layer : layers) {
-      std::memcpy(rgba, layer.level(level).data(), bytes);
-      rgba += bytes;
-    }
-    return QUOIN_OK;
-  });
-}
-
-quoin_status quoin_textures_faces(quoin_textures textures, std::size_t type, quoin_face* out, std::size_t* count) {
-  return with_textures(textures, [&](const TexturesBody& body) {
-    if (count == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "count is null");
-    if (!has_fit_size(out)) return fail(QUOIN_INVALID_ARGUMENT, "out is null, or its size");
-    if (type >= body.types.size()) return fail(QUOIN_INVALID_ARGUMENT, "no type has this number");
-    const VoxelFaces& faces = body.types[static_cast<VoxelType>(type)].faces;
-    *count = faces.empty() ? 0 : 6;
-    const std::size_t size = out->size;
-    for (std::size_t i = 0; i < *count; ++i) {
-      quoin_face whole = described(faces[static_cast<Direction>(i)], body.set);
-      whole.size = size;
-      std::memcpy(reinterpret_cast<std::byte*>(out) + i * size, &whole, size);
-    }
-    return QUOIN_OK;
-  });
-}
-
 quoin_status quoin_grid_count(quoin_scene scene, std::size_t* out) {
   return report_count(scene, out, [](SceneBody& body) { return body.numbers.grids.size(); });
 }
@@ -651,23 +491,21 @@ quoin_status quoin_grid_read(quoin_scene scene, std::size_t grid, const std::int
   return with_scene(scene, Use::Read, [&](SceneBody& body) {
     if (min == nullptr || shape == nullptr || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "an array is null");
     if (grid >= body.numbers.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
-    if (!is_in_range(min, shape)) return fail(QUOIN_INVALID_ARGUMENT, "the box is out of range");
-    std::size_t left = capacity;
-    for (int axis = 0; axis < 3; ++axis) {
-      if (shape[axis] == 0) return QUOIN_OK;
-      left /= static_cast<std::size_t>(shape[axis]);
-    }
-    if (left == 0) return fail(QUOIN_INVALID_ARGUMENT, "the array is too small for the box");
-    // x is the array's slowest axis but the grid's fastest: read whole runs along x.
     GridReader reader(body.loaded.scene.grids()[body.numbers.grids[grid]].grid);
-    const auto plane = static_cast<std::size_t>(shape[1]) * static_cast<std::size_t>(shape[2]);
-    for (std::int32_t z = 0; z < shape[2]; ++z) {
-      for (std::int32_t y = 0; y < shape[1]; ++y) {
-        std::uint16_t* to = out + static_cast<std::size_t>(y) * static_cast<std::size_t>(shape[2]) + z;
-        for (std::int32_t x = 0; x < shape[0]; ++x, to += plane) *to = reader.get(min[0] + x, min[1] + y, min[2] + z);
-      }
-    }
-    return QUOIN_OK;
+    return read_box(min, shape, capacity, [&](std::size_t to, int x, int y, int z) { out[to] = reader.get(x, y, z); });
+  });
+}
+
+quoin_status quoin_grid_read_states(quoin_scene scene, std::size_t grid, const std::int32_t min[3],
+                                    const std::int32_t shape[3], std::uint32_t* out, std::size_t capacity) {
+  return with_scene(scene, Use::Read, [&](SceneBody& body) {
+    if (min == nullptr || shape == nullptr || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "an array is null");
+    if (grid >= body.numbers.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
+    const Grid& from = body.loaded.scene.grids()[body.numbers.grids[grid]].grid;
+    const bool has_data = from.data_count() > 0;
+    return read_box(min, shape, capacity, [&](std::size_t to, int x, int y, int z) {
+      out[to] = has_data ? from.data({x, y, z}).state : 0;
+    });
   });
 }
 
@@ -725,5 +563,15 @@ quoin_status quoin_grid_write(quoin_scene scene, std::size_t grid, const quoin_a
     if (grid >= body.numbers.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
     if (const char* wrong = validate_array(*given)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
     return write_grid(body, body.numbers.grids[grid], *given);
+  });
+}
+
+quoin_status quoin_grid_write_states(quoin_scene scene, std::size_t grid, const quoin_array* array) {
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
+    const auto given = taken_array(array);
+    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "array is null, or its size");
+    if (grid >= body.numbers.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
+    if (const char* wrong = validate_array(*given, Holds::States)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+    return write_states(body, body.numbers.grids[grid], *given);
   });
 }
