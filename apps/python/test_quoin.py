@@ -139,7 +139,7 @@ class Scenes(unittest.TestCase):
         array, scene = self.scene()
         ink = scene.add_type(quoin.VoxelType((1, 2, 3), "ink"))
         self.assertEqual(scene.types[ink].rgba, (1, 2, 3, 255))
-        self.assertEqual(scene.types[ink][-3:], (0, None, None))
+        self.assertEqual(scene.types[ink][9:], (0, None, None, 0, True))
         grate = quoin.VoxelType((1, 2, 3, 255), light_cost=3, blocks_light=False, occludes=False)
         added = scene.add_type(grate)
         self.assertEqual(scene.types[added], grate)
@@ -644,6 +644,142 @@ class Textures(unittest.TestCase):
         scene.set_faces(2, None)
         self.assertIsNone(scene.grids[0].mesh().textures)
         self.assertEqual(scene.textures().arrays, [])
+
+
+class Shapes(unittest.TestCase):
+    def scene(self):
+        return quoin.from_numpy(np.arange(1, 4, dtype=np.uint8).reshape(3, 1, 1),
+                                [(90, 90, 90), quoin.VoxelType((200, 160, 90), "stairs", state_bits=4),
+                                 quoin.VoxelType((120, 80, 40, 90), "fence", collides=False)])
+
+    def fence(self):
+        bark = quoin.Face(np.full((16, 16, 3), 77, np.uint8), "bark", turn=3, tint=(255, 128, 0))
+        post = quoin.Element((6, 0, 6), (10, 16, 10), looks={"+Y": bark, "-Y": (1, 2, 3), "+Z": None},
+                             parts={"+Y": (0.0, 0.0, 12.5, -1.0)})
+        leaf = quoin.Element((0, 3, 8), (16, 3, 24), quoin.Turn(22.5, 0, (0.0, 3.0, 8.0), True), {"-Y": bark},
+                             collides=False)
+        arm = quoin.ShapePart((quoin.Element((10, 6, 7), (16, 9, 9)),), quoin.turn_orientation(axis=1, quarter_turns=3),
+                              (quoin.Condition(connected=("+Z",), unconnected=("-X", "-Z")),
+                               quoin.Condition(state_mask=0, corner="inner_right")))
+        return quoin.Shapes((quoin.ShapePart((post, leaf), 29), arm), "connected", 6, False)
+
+    def test_are_read_back_and_kept_in_files(self):
+        scene, fence = self.scene(), self.fence()
+        scene.set_shapes(3, fence)
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "fence.json")
+            scene.save(path)
+            again = quoin.load(path)
+        for one in (scene, again):
+            found = one.textures().shapes(3)
+            self.assertEqual(found[1:], ("connected", 6, False))
+            self.assertEqual(found.parts[1], fence.parts[1])
+            self.assertEqual(found.parts[0].orientation, 29)
+            for element, given in zip(found.parts[0].elements, fence.parts[0].elements):
+                self.assertEqual((element[:3], element[4:]), (given[:3], given[4:]))
+                self.assertEqual(set(element.looks), set(given.looks))
+            looks = found.parts[0].elements[0].looks
+            self.assertEqual((looks["+Y"].name, looks["+Y"].turn, looks["+Y"].tint, looks["+Y"].texture),
+                             ("bark", 3, (255, 128, 0), 0))
+            self.assertTrue((looks["+Y"].image[..., :3] == 77).all())
+            self.assertEqual((looks["-Y"], looks["+Z"]), ((1, 2, 3), None))
+            self.assertIsNone(one.textures().shapes(1))
+            self.assertFalse(one.types[3].collides)
+        scene.set_shapes(3, None)
+        self.assertIsNone(scene.textures().shapes(3))
+        scene.set_shapes(3, quoin.Shapes(neighbours="fluid"))
+        self.assertEqual(scene.textures().shapes(3), quoin.Shapes(neighbours="fluid"))
+
+    def test_of_meshes_follow_states(self):
+        scene = self.scene()
+        scene.set_shapes(2, [quoin.Element(max=(16, 8, 16)), quoin.Element((8, 8, 0), (16, 16, 16))])
+        scene.set_orientations(2, quoin.Orientations("about_y_and_upside_down", first_bit=1, front="-Z"))
+        self.assertEqual(scene.orientations(2)[1:], (1, "-Z"))
+        self.assertIsNone(scene.orientations(1))
+        grid = scene.grids[0]
+
+        def top():
+            mesh = grid.mesh()
+            corners = mesh.positions[(mesh.types == 2) & (mesh.normals[:, 1] > 0.5)].reshape(-1, 4, 3)
+            self.assertEqual(mesh.textures.shape, mesh.types.shape)
+            return sorted((float(one[:, 0].min()), float(one[0, 1])) for one in corners)
+
+        self.assertEqual(top(), [(1.0, 0.5), (1.5, 1.0)])
+        states = np.zeros((3, 1, 1), np.uint8)
+        states[1] = 0b100  # a half turn
+        grid.write_states(states)
+        self.assertEqual(top(), [(1.0, 0.5), (1.0, 1.0)])
+        self.assertEqual((grid.states().dtype, grid.states()[:, 0, 0].tolist()), (np.uint32, [0, 4, 0]))
+        self.assertEqual(grid.states((1, 0, 0), (1, 1, 1)).tolist(), [[[4]]])
+        self.assertEqual(scene.turned_state(2, 4, quoin.turn_orientation(axis=1)), 6)
+        # The front turns to +Z.
+        self.assertEqual(scene.placed_state(2, "+Y", look=(0, -1, 3), front="away_from_player", state=1), 0b101)
+        grid.write_states(np.full((1, 1, 1), 8, np.uint32), (1, 0, 0))
+        self.assertEqual(top(), [(1.0, 1.0)])
+
+    def test_stay_when_types_are_replaced(self):
+        scene = self.scene()
+        scene.set_shapes(2, quoin.Element(max=(16, 8, 16)))
+        scene.set_type(2, scene.types[2]._replace(blocks_light=True, name="dark"))
+        self.assertEqual((scene.types[2].blocks_light, scene.types[2].name), (True, "dark"))
+        self.assertEqual(len(scene.textures().shapes(2).parts), 1)
+
+    def test_orientations_are_matrices(self):
+        found = set()
+        for axis in range(3):
+            for turns in range(-1, 3):
+                for first in range(48):
+                    one = quoin.turn_orientation(first, axis, turns)
+                    quarter = np.round(np.linalg.matrix_power(
+                        quoin.orientation_matrix(quoin.turn_orientation(axis=axis)).astype(float), turns)).astype(int)
+                    self.assertTrue((quoin.orientation_matrix(one) == quarter @ quoin.orientation_matrix(first)).all())
+                    found.add(one)
+        self.assertEqual(found, set(range(48)))
+        self.assertEqual([round(np.linalg.det(quoin.orientation_matrix(i))) for i in range(48)].count(1), 24)
+
+    def test_errors_change_nothing(self):
+        scene = self.scene()
+        box, part = quoin.Element(), quoin.ShapePart
+        grid = scene.grids[0]
+        for wrong, error in [
+            (lambda: scene.set_shapes(3, []), quoin.QuoinError),
+            (lambda: scene.set_shapes(3, [(1, 2)]), TypeError),
+            (lambda: scene.set_shapes(3, quoin.Shapes((box,))), TypeError),
+            (lambda: scene.set_shapes(3, quoin.Shapes((part((box,), 0, (1,)),))), TypeError),
+            (lambda: scene.set_shapes(3, quoin.Shapes((part((box,)),), "near")), ValueError),
+            (lambda: scene.set_shapes(3, quoin.Shapes((part((box,), 48),))), quoin.QuoinError),
+            (lambda: scene.set_shapes(3, box._replace(max=(16, 33, 16))), quoin.QuoinError),
+            (lambda: scene.set_shapes(3, box._replace(max=(16, float("nan"), 16))), quoin.QuoinError),
+            (lambda: scene.set_shapes(3, box._replace(max=(16, 16))), ValueError),
+            (lambda: scene.set_shapes(3, box._replace(looks={"up": None})), ValueError),
+            (lambda: scene.set_shapes(3, box._replace(looks={"+X": (1, 2)})), ValueError),
+            (lambda: scene.set_shapes(3, box._replace(parts={"+X": (1, 2)})), ValueError),
+            (lambda: scene.set_shapes(3, [box] * 129), quoin.QuoinError),
+            (lambda: scene.set_shapes(0, box), quoin.QuoinError),
+            (lambda: scene.set_shapes(2, quoin.Shapes((part((box,), 0, (quoin.Condition(corner="x"),)),))), ValueError),
+            (lambda: scene.set_shapes(3, quoin.Shapes((part((box,), 0, (quoin.Condition(1),)),))), quoin.QuoinError),
+            (lambda: scene.set_orientations(3, "about_y"), quoin.QuoinError),
+            (lambda: scene.set_orientations(2, "about_z"), ValueError),
+            (lambda: scene.set_orientations(2, (0, 1)), TypeError),
+            (lambda: scene.set_orientations(2, quoin.Orientations((0, 48))), quoin.QuoinError),
+            (lambda: scene.set_orientations(2, quoin.Orientations((0,) * 49)), ValueError),
+            (lambda: scene.placed_state(2, "up", (1, 0, 0)), ValueError),
+            (lambda: scene.placed_state(2, "+Y", (1, 0, 0), front="left"), ValueError),
+            (lambda: scene.placed_state(9, "+Y", (1, 0, 0)), quoin.QuoinError),
+            (lambda: scene.turned_state(2, -1, 0), ValueError),
+            (lambda: scene.add_type(quoin.VoxelType((1, 2, 3), state_bits=33)), ValueError),
+            (lambda: quoin.turn_orientation(48), quoin.QuoinError),
+            (lambda: quoin.orientation_matrix(48), ValueError),
+            (lambda: grid.write_states(np.full((3, 1, 1), 16, np.uint8)), quoin.QuoinError),
+            (lambda: grid.write_states(np.zeros((3, 1, 1), np.int64)), TypeError),
+            (lambda: grid.write_states(np.zeros((3, 1), np.uint8)), ValueError),
+        ]:
+            with self.subTest(wrong), self.assertRaises(error):
+                wrong()
+        with self.assertRaisesRegex(quoin.QuoinError, "part 1 of the shapes: cannot use element 0 of a shape: "):
+            scene.set_shapes(3, quoin.Shapes((part((box,)), part((box._replace(min=(-17, 0, 0)),)))))
+        self.assertIsNone(scene.textures().shapes(3))
+        self.assertFalse(grid.states().any())
 
 
 class BadInput(unittest.TestCase):

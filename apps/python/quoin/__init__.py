@@ -36,12 +36,14 @@ from ._c import NdArray, QuoinError, Status
 from ._mesh import Mesh, mesh_labels, surface_nets
 from ._scene import (Body, Camera, Environment, Fog, Format, Grid, Ground, Group, Heights, Hits, Instance, Lamp, Layer,
                      Raw, Scene, Sun, VoxelType, formats, from_numpy, load, load_bytes)
-from ._textures import Face, Textures
+from ._textures import (Condition, Element, Face, Orientations, ShapePart, Shapes, Textures, Turn, orientation_matrix,
+                        turn_orientation)
 
-__all__ = ["Body", "Camera", "Environment", "Face", "Fog", "Format", "Grid", "Ground", "Group", "Heights", "Hits",
-           "Instance", "Lamp", "Layer", "Mesh", "QuoinError", "Raw", "Scene", "Status", "Sun", "Textures", "VoxelType",
-           "__version__", "formats", "from_numpy", "load", "load_bytes", "mesh_labels", "png", "progress",
-           "surface_nets", "version"]
+__all__ = ["Body", "Camera", "Condition", "Element", "Environment", "Face", "Fog", "Format", "Grid", "Ground", "Group",
+           "Heights", "Hits", "Instance", "Lamp", "Layer", "Mesh", "Orientations", "QuoinError", "Raw", "Scene",
+           "ShapePart", "Shapes", "Status", "Sun", "Textures", "Turn", "VoxelType", "__version__", "formats",
+           "from_numpy", "load", "load_bytes", "mesh_labels", "orientation_matrix", "png", "progress", "surface_nets",
+           "turn_orientation", "version"]
 
 
 def __dir__() -> List[str]:

@@ -70,7 +70,8 @@ class Type(ctypes.Structure):
                 ("metalness", ctypes.c_float), ("roughness", ctypes.c_float), ("name", ctypes.c_char * 128),
                 ("transparent", ctypes.c_int32), ("ior", ctypes.c_float), ("scattering", ctypes.c_float),
                 ("anisotropy", ctypes.c_float), ("light_cost", ctypes.c_int32), ("blocks_light", ctypes.c_int32),
-                ("occludes", ctypes.c_int32)]
+                ("occludes", ctypes.c_int32), ("reserved", ctypes.c_int32), ("state_bits", ctypes.c_int32),
+                ("passable", ctypes.c_int32)]
 
 
 NO_TEXTURE = 0xFFFFFFFF
@@ -86,6 +87,43 @@ class Face(ctypes.Structure):
 class TextureArray(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("texels", ctypes.c_int32), ("levels", ctypes.c_int32),
                 ("layers", ctypes.c_size_t)]
+
+
+class Orientations(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("kind", ctypes.c_int32), ("first_bit", ctypes.c_int32),
+                ("front", ctypes.c_int32), ("count", ctypes.c_int32), ("by_value", ctypes.c_uint8 * 48)]
+
+
+class ShapeElement(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("min", ctypes.c_float * 3), ("max", ctypes.c_float * 3),
+                ("has_turn", ctypes.c_int32), ("turn_axis", ctypes.c_int32), ("turn_degrees", ctypes.c_float),
+                ("turn_origin", ctypes.c_float * 3), ("turn_rescales", ctypes.c_int32), ("passable", ctypes.c_int32),
+                ("looks", ctypes.c_int32 * 6), ("has_parts", ctypes.c_uint32), ("parts", ctypes.c_float * 4 * 6),
+                ("reserved", ctypes.c_int32)]
+
+
+class ShapeCondition(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("state_mask", ctypes.c_uint32), ("state", ctypes.c_uint32),
+                ("connected", ctypes.c_uint32), ("unconnected", ctypes.c_uint32), ("corner", ctypes.c_int32),
+                ("reserved", ctypes.c_int32)]
+
+
+class ShapePart(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("element_count", ctypes.c_size_t), ("condition_count", ctypes.c_size_t),
+                ("orientation", ctypes.c_int32), ("reserved", ctypes.c_int32)]
+
+
+class Shapes(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("parts", ctypes.c_void_p), ("part_count", ctypes.c_size_t),
+                ("elements", ctypes.c_void_p), ("element_count", ctypes.c_size_t), ("conditions", ctypes.c_void_p),
+                ("condition_count", ctypes.c_size_t), ("looks", ctypes.c_void_p), ("look_count", ctypes.c_size_t),
+                ("neighbours", ctypes.c_int32), ("groups", ctypes.c_uint32), ("ignores_full_sides", ctypes.c_int32),
+                ("reserved", ctypes.c_int32)]
+
+
+class Placing(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("face", ctypes.c_int32), ("front", ctypes.c_int32),
+                ("point", ctypes.c_float * 3), ("reserved", ctypes.c_int32), ("look", ctypes.c_double * 3)]
 
 
 class Instance(ctypes.Structure):
@@ -220,17 +258,28 @@ _SIGNATURES = {
     "quoin_type_count": (_handle, _p),
     "quoin_type_get": (_handle, _n, _p),
     "quoin_type_add": (_handle, _p, _p),
+    "quoin_type_set": (_handle, _n, _p),
     "quoin_type_set_faces": (_handle, _n, _p),
+    "quoin_type_get_orientations": (_handle, _n, _p),
+    "quoin_type_set_orientations": (_handle, _n, _p),
+    "quoin_orientation_turn": (_i, _i, _i, _p),
+    "quoin_type_turned_state": (_handle, _n, ctypes.c_uint32, _i, _p),
+    "quoin_type_placed_state": (_handle, _n, _p, ctypes.c_uint32, _p),
+    "quoin_type_set_shapes": (_handle, _n, _p),
     "quoin_scene_textures": (_handle, _n, _p),
     "quoin_textures_array_count": (_handle, _p),
     "quoin_textures_array_get": (_handle, _n, _p),
     "quoin_textures_read": (_handle, _n, _i, _p, _n),
     "quoin_textures_faces": (_handle, _n, _p, _p),
+    "quoin_textures_shapes": (_handle, _n, _p),
+    "quoin_textures_read_shapes": (_handle, _n, _p, _p, _p, _p),
     "quoin_grid_count": (_handle, _p),
     "quoin_grid_get_info": (_handle, _n, _p),
     "quoin_grid_read": (_handle, _n, _p, _p, _p, _n),
     "quoin_grid_add": (_handle, _p, ctypes.c_char_p, _p),
     "quoin_grid_write": (_handle, _n, _p),
+    "quoin_grid_read_states": (_handle, _n, _p, _p, _p, _n),
+    "quoin_grid_write_states": (_handle, _n, _p),
     "quoin_grid_set_storage": (_handle, _n, _i, _i),
     "quoin_grid_body": (_handle, _n, _p, _n, _p),
     "quoin_grid_pieces": (_handle, _n, _p, _n, _p, _n, _p),
@@ -412,6 +461,14 @@ def types_of(array: Any, origin: Sequence[float]) -> Any:
     """Converts an array of voxel types to a quoin_array, without copying."""
     if isinstance(array, np.ndarray) and array.dtype not in (np.uint8, np.uint16, np.bool_):
         raise TypeError(f"voxel types must be uint8 or uint16, not {array.dtype}; convert the array with astype")
+    return array_of(array, (1, 1, 1), origin)
+
+
+def states_of(array: Any, origin: Sequence[float]) -> Any:
+    """Converts an array of voxel states to a quoin_array, without copying."""
+    if isinstance(array, np.ndarray) and array.dtype not in (np.uint8, np.uint16, np.uint32):
+        raise TypeError(f"voxel states must be uint8, uint16 or uint32, not {array.dtype}; convert the array with "
+                        "astype")
     return array_of(array, (1, 1, 1), origin)
 
 

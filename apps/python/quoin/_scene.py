@@ -11,7 +11,8 @@ import numpy as np
 from . import _c
 from ._c import NdArray
 from ._mesh import Mesh
-from ._textures import Face, Textures, faces_struct
+from ._textures import (DIRECTIONS, Element, Face, Orientations, Shapes, Textures, faces_struct, orientations_struct,
+                        shapes_struct)
 
 Path = Union[str, "os.PathLike[str]"]
 Colour = Sequence[int]
@@ -33,6 +34,8 @@ class VoxelType(NamedTuple):
     light_cost: int = 0  #: levels of propagated light that a step into it costs, 0 to 15; 1: water, leaves
     blocks_light: Optional[bool] = None  #: propagated light does not leave it; None: true unless transparent
     occludes: Optional[bool] = None  #: darkens corners of faces in meshes; None: true unless transparent
+    state_bits: int = 0  #: number of bits of its voxels' states, 0 to 32
+    collides: bool = True  #: stops moving bodies
 
 
 class Instance(NamedTuple):
@@ -131,6 +134,7 @@ class Environment(NamedTuple):
     fog: Optional[Fog] = None
 
 
+_FRONTS = ("towards_player", "away_from_player", "away_from_wall")
 _SKIES = ("gradient", "fixed", "physical", "uniform", "image")
 _TONES = (None, "clamp", "neutral", "agx", "aces")
 
@@ -185,6 +189,7 @@ def _struct_of(type: Union[VoxelType, Colour]) -> Any:
     one.scattering, one.anisotropy = type.scattering, type.anisotropy
     one.light_cost = _c.whole(type.light_cost, "light_cost", 0, 15)
     one.blocks_light, one.occludes = _sign_of(type.blocks_light), _sign_of(type.occludes)
+    one.state_bits, one.passable = _c.whole(type.state_bits, "state_bits", 0, 32), int(not type.collides)
     return one
 
 
@@ -297,15 +302,25 @@ class Grid:
         `origin`, `shape`: three integers each, in the grid's voxels; default: the grid's `origin` and `shape`. Raises
         TypeError if they are not integers, and ValueError if they are not three or a size is negative.
         """
+        return self._read(_c.lib.quoin_grid_read, np.uint16, origin, shape)
+
+    def states(self, origin: Optional[Sequence[int]] = None, shape: Optional[Sequence[int]] = None) -> NdArray:
+        """Copies the states of a box's voxels to a new array: uint32, (nx, ny, nz). `origin`, `shape`: as in
+        `to_numpy`. A state has 32 bits and is 0 by default. Types decide what it means: their orientations and shapes
+        select by it."""
+        return self._read(_c.lib.quoin_grid_read_states, np.uint32, origin, shape)
+
+    def _read(self, function: Any, dtype: Any, origin: Optional[Sequence[int]],
+              shape: Optional[Sequence[int]]) -> NdArray:
         info = self._info()
         at = [_c.whole(v, "origin") for v in (info.min if origin is None else origin)]
         extent = [_c.whole(v, "shape") for v in (info.extent if shape is None else shape)]
         if len(at) != 3 or len(extent) != 3 or min(extent) < 0:
             raise ValueError("origin and shape must be three integers")
-        out = np.zeros(extent, np.uint16)
+        out = np.zeros(extent, dtype)
         three = ctypes.c_int32 * 3
-        _c.check(_c.lib.quoin_grid_read(self._scene._owner.handle, self._number, three(*at), three(*extent),
-                                        out.ctypes.data, out.size))
+        _c.check(function(self._scene._owner.handle, self._number, three(*at), three(*extent), out.ctypes.data,
+                          out.size))
         return out
 
     def write(self, array: NdArray, origin: Optional[Sequence[float]] = None) -> None:
@@ -324,6 +339,22 @@ class Grid:
         """
         given = _c.types_of(array, self.origin if origin is None else origin)
         _c.check(_c.lib.quoin_grid_write(self._scene._owner.handle, self._number, ctypes.byref(given)))
+
+    def write_states(self, array: NdArray, origin: Optional[Sequence[float]] = None) -> None:
+        """Replaces the states of a box's voxels. Air ignores them. `write` makes the state of a voxel 0 if it changes
+        the voxel's type, and else keeps it.
+
+        `array`: uint8, uint16 or uint32, (nx, ny, nz). `origin`: as in `write`. Raises TypeError for any other dtype,
+        ValueError for a wrong shape, and QuoinError if a state has more bits than its type; then nothing changes.
+
+        >>> scene = from_numpy(np.ones((3, 1, 1), np.uint8), [VoxelType((90, 60, 30), "log", state_bits=2)])
+        >>> scene.set_orientations(1, "along_axes")
+        >>> scene.grids[0].write_states(np.array([[[0]], [[1]], [[2]]], np.uint8))
+        >>> scene.grids[0].states()[:, 0, 0].tolist()
+        [0, 1, 2]
+        """
+        given = _c.states_of(array, self.origin if origin is None else origin)
+        _c.check(_c.lib.quoin_grid_write_states(self._scene._owner.handle, self._number, ctypes.byref(given)))
 
     def body(self, densities: Optional[Sequence[float]] = None) -> Body:
         """Returns the mass, the centre of mass and the inertia of the grid: of its density field if it has one.
@@ -512,7 +543,7 @@ class Scene:
         """All voxel types. Entry 0 is air."""
         return [VoxelType(tuple(one.rgba), _c.text_of(one.name), one.emission, one.metalness, one.roughness,
                           bool(one.transparent), one.ior, one.scattering, one.anisotropy, one.light_cost,
-                          _flag_of(one.blocks_light), _flag_of(one.occludes))
+                          _flag_of(one.blocks_light), _flag_of(one.occludes), one.state_bits, not one.passable)
                 for one in self._all(_c.lib.quoin_type_count, _c.lib.quoin_type_get, _c.Type)]
 
     @property
@@ -540,6 +571,18 @@ class Scene:
         _c.check(_c.lib.quoin_type_add(self._owner.handle, ctypes.byref(one), ctypes.byref(out)))
         return out.value
 
+    def set_type(self, type: int, properties: Union[VoxelType, Colour]) -> None:
+        """Replaces the properties of a type. Its faces, orientations and shapes stay. Set `blocks_light` of a type with
+        shapes after its shapes. Raises errors like `add_type`.
+
+        >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0)])
+        >>> scene.set_type(1, scene.types[1]._replace(emission=2.0))
+        >>> scene.types[1].emission
+        2.0
+        """
+        one = _struct_of(properties)
+        _c.check(_c.lib.quoin_type_set(self._owner.handle, _c.size(type, "type"), ctypes.byref(one)))
+
     def set_faces(self, type: int, faces: Union[Face, Sequence[Face], None]) -> None:
         """Sets the textures of a type: one face for all sides, three (sides, top, bottom), or six in the order +X, -X,
         +Y, -Y, +Z, -Z. The type's colour becomes their mean. None removes the textures, and the type keeps its colour.
@@ -557,6 +600,80 @@ class Scene:
         """
         given = None if faces is None else faces_struct(faces)
         _c.check(_c.lib.quoin_type_set_faces(self._owner.handle, _c.size(type, "type"), given))
+
+    def set_shapes(self, type: int, shapes: Union[Shapes, Element, Sequence[Element], None]) -> None:
+        """Sets the shapes of a type: one box, several, or `Shapes` with conditions. None makes it a cube. The type's
+        transparency is that of the material: stairs of stone are opaque. `Textures.shapes` reads them back.
+
+        Raises TypeError or ValueError for objects and numbers that do not fit, and QuoinError, which names the part and
+        the element, for other errors; then nothing changes.
+
+        >>> scene = from_numpy(np.ones((2, 1, 2), np.uint8), [(170, 170, 165)])
+        >>> scene.set_shapes(1, [Element(max=(16, 8, 16)), Element((8, 8, 0), (16, 16, 16))])   # a step
+        >>> float(scene.grids[0].mesh().positions[:, 1].max())
+        1.0
+        """
+        given = None if shapes is None else shapes_struct(shapes)
+        _c.check(_c.lib.quoin_type_set_shapes(self._owner.handle, _c.size(type, "type"),
+                                              None if given is None else ctypes.byref(given)))
+
+    def set_orientations(self, type: int, orientations: Union[Orientations, str, None]) -> None:
+        """Sets the orientations that the state of a type's voxels selects, or their name (see `Orientations`). None:
+        never turned. Raises QuoinError if the type's `state_bits` do not contain their bits.
+
+        >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [VoxelType((90, 90, 90), "furnace", state_bits=2)])
+        >>> scene.set_orientations(1, "about_y")
+        >>> scene.orientations(1).by_value
+        (0, 44, 5, 41)
+        """
+        given = None if orientations is None else orientations_struct(orientations)
+        _c.check(_c.lib.quoin_type_set_orientations(self._owner.handle, _c.size(type, "type"),
+                                                    None if given is None else ctypes.byref(given)))
+
+    def orientations(self, type: int) -> Optional[Orientations]:
+        """Returns the orientations that the state of a type's voxels selects; None if it never turns them."""
+        one = _c.sized(_c.Orientations)
+        _c.check(_c.lib.quoin_type_get_orientations(self._owner.handle, _c.size(type, "type"), ctypes.byref(one)))
+        if not one.count:
+            return None
+        return Orientations(tuple(one.by_value[:one.count]), one.first_bit, DIRECTIONS[one.front])
+
+    def placed_state(self, type: int, face: str, look: Sequence[float], point: Sequence[float] = (0.5, 1.0, 0.5),
+                     state: int = 0, front: Optional[str] = None) -> int:
+        """Returns the state with which a player places a voxel of a type at a face: the orientation that fits best,
+        with the other bits of `state`. Torches point away from the face, slabs and stairs go into the half that was
+        hit.
+
+        `face`: direction of the face that was hit. `look`: direction in which the player looks. `point`: the point that
+        was hit, in voxels from the hit voxel's minimum corner. All are in the grid's space. `front`: the front turns
+        "towards_player", "away_from_player" or "away_from_wall" (the direction of the face); None: by the shape, away
+        from the player for stairs.
+
+        >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [VoxelType((250, 220, 120), "torch", state_bits=3)])
+        >>> scene.set_orientations(1, "to_directions")
+        >>> scene.placed_state(1, "-Z", look=(0, 0, 1))
+        5
+        """
+        given = _c.sized(_c.Placing)
+        if face not in DIRECTIONS:
+            raise ValueError(f"face must be one of {', '.join(DIRECTIONS)}, not {face!r}")
+        if front is not None and front not in _FRONTS:
+            raise ValueError(f"front must be one of {', '.join(_FRONTS)} or None, not {front!r}")
+        given.face, given.front = DIRECTIONS.index(face), 0 if front is None else 1 + _FRONTS.index(front)
+        given.point[:], given.look[:] = _c.three(point, "point"), _c.three(look, "look")
+        out = ctypes.c_uint32()
+        _c.check(_c.lib.quoin_type_placed_state(self._owner.handle, _c.size(type, "type"), ctypes.byref(given),
+                                                _c.whole(state, "state", 0, 2**32 - 1), ctypes.byref(out)))
+        return out.value
+
+    def turned_state(self, type: int, state: int, orientation: int) -> int:
+        """Returns the state of a voxel after it was turned or mirrored by an orientation (see `turn_orientation`), such
+        as in a turned copy of a building."""
+        out = ctypes.c_uint32()
+        _c.check(_c.lib.quoin_type_turned_state(self._owner.handle, _c.size(type, "type"),
+                                                _c.whole(state, "state", 0, 2**32 - 1),
+                                                _c.whole(orientation, "orientation"), ctypes.byref(out)))
+        return out.value
 
     def textures(self, max_layers: int = 0) -> Textures:
         """Numbers the textures of all types, each once, as layers of arrays for a device. `max_layers`: the device's
