@@ -683,6 +683,70 @@ def check_textures(quoin, folder):
     require(colours & texels, f"colours {colours}")
 
 
+def check_shapes(quoin, folder):
+    """Shapes and turned cubes are geometry with the right materials, and an export keeps shapes and states."""
+    bark, ring = (np.full((16, 16, 3), value, np.uint8) for value in (120, 200))
+    stairs = quoin.VoxelType((150, 110, 70), "stairs", state_bits=3, blocks_light=True)
+    log = quoin.VoxelType((90, 60, 30), "log", state_bits=2)
+    scene = quoin.from_numpy(np.array([1, 2, 0, 3], np.uint8).reshape(4, 1, 1), [stairs, log, (220, 40, 160, 90)])
+    scene.set_shapes(1, [quoin.Element(max=(16, 8, 16), looks={"+Y": (10, 200, 30)}),
+                         quoin.Element((8, 8, 0), (16, 16, 16), looks={"-X": quoin.Face(ring, "step", turn=1)})])
+    scene.set_type(1, stairs)  # after the shapes, which else decide the light
+    scene.set_orientations(1, "about_y_and_upside_down")
+    scene.set_faces(2, [quoin.Face(bark, "bark"), quoin.Face(ring, "ring"), quoin.Face(ring, "ring")])
+    scene.set_orientations(2, "along_axes")
+    leaf = np.full((16, 16, 4), 90, np.uint8)
+    scene.set_faces(3, quoin.Face(leaf, "leaf", alpha="cutout"))
+    plate = quoin.Element((0, 0, 8), (16, 16, 8), quoin.Turn(45.0), collides=False)
+    scene.set_shapes(3, quoin.Shapes((quoin.ShapePart((plate, plate._replace(turn=quoin.Turn(-45.0)))),)))
+    states = np.array([2, 1, 0, 0], np.uint8).reshape(4, 1, 1)
+    scene.grids[0].write_states(states)
+    path = os.path.join(folder, "shapes.json")
+    scene.save(path)
+    for palette in ("AUTO", "PALETTE"):
+        empty()
+        run(bpy.ops.import_scene.quoin, filepath=path, scale=1.0, materials=palette)
+        mesh, = bpy.data.meshes
+        seen = {}
+        for polygon in mesh.polygons:
+            name = mesh.materials[polygon.material_index].name.split(".")[0]
+            corners = np.array([mesh.vertices[i].co for i in polygon.vertices])
+            seen.setdefault(name, []).append((corners.min(0), corners.max(0), np.array(polygon.normal)))
+        plain = "shapes palette" if palette == "PALETTE" else "stairs"
+        require(set(seen) == {plain, "stairs", "step", "bark", "ring", "leaf"}, f"materials {sorted(seen)}")
+        # Blender's z is up. The stairs are turned by a half turn: the high half is at -X and its step looks to +X.
+        (low, high, normal), = seen["step"]
+        require(np.allclose(low[::2], (0.5, 0.5)) and np.allclose(high[::2], (0.5, 1.0)) and normal[0] > 0.9, "step")
+        green = [one for one in mesh.materials if one.name.startswith("stairs")
+                 and np.allclose(one.diffuse_color[:3], (0.003, 0.578, 0.013), atol=1e-3)]
+        require(len(green) == 1, "the slab's own colour")
+        require(all(abs(normal[0]) > 0.9 for _, _, normal in seen["ring"]) and len(seen["ring"]) == 2, "the log lies")
+        require(len(seen["bark"]) == 4 and len(seen["leaf"]) == 4, "bark and leaves")
+        require(any(abs(abs(normal[0]) - 0.5 ** 0.5) < 1e-3 for _, _, normal in seen["leaf"]), "turned plates")
+        layer = mesh.uv_layers["Texture"].data
+        for polygon in mesh.polygons:
+            if mesh.materials[polygon.material_index].name.startswith("leaf"):
+                uv = np.array([layer[i].uv for i in polygon.loop_indices])
+                require(np.allclose(uv.max(0) - uv.min(0), 1.0), "a plate shows the whole texture")
+        bpy.ops.wm.save_as_mainfile(filepath=os.path.join(folder, "shapes.blend"))
+        bpy.ops.wm.open_mainfile(filepath=os.path.join(folder, "shapes.blend"))
+        again = os.path.join(folder, "shapes_again.json")
+        run(bpy.ops.export_scene.quoin, filepath=again, scale=1.0)
+        read = quoin.load(again)
+        require((read.grids[0].to_numpy() == scene.grids[0].to_numpy()).all(), "types")
+        require((read.grids[0].states()[:, 0, 0] == states[:, 0, 0]).all(), "states")
+        require(read.types[1:] == scene.types[1:], f"types {read.types} {scene.types}")
+        for i in range(1, 4):
+            require(read.orientations(i) == scene.orientations(i), "orientations")
+            a, b = read.textures().shapes(i), scene.textures().shapes(i)
+            require((a is None) == (b is None), "shapes")
+            bare = lambda shapes: [[each._replace(looks={}) for each in part.elements] for part in shapes.parts]
+            require(a is None or bare(a) == bare(b), "elements")
+        step = read.textures().shapes(1).parts[0].elements[1].looks["-X"]
+        require((step.name, step.turn) == ("step", 1) and (step.image[..., :3] == ring).all(), "the step's look")
+        require(read.textures().shapes(1).parts[0].elements[0].looks["+Y"] == (10, 200, 30), "the slab's colour")
+
+
 def main():
     addon, castle, folder = sys.argv[sys.argv.index("--") + 1 :]
     bpy.ops.preferences.addon_install(filepath=addon)
@@ -716,6 +780,7 @@ def main():
     check_edits(quoin, folder)
     check_colours(quoin, folder)
     check_textures(quoin, folder)
+    check_shapes(quoin, folder)
     check_refusals(folder)
     check_surfaces(castle)
     empty()

@@ -25,6 +25,17 @@ _ANY_PLACE = {".json", ".quoin"}
 _GROUPS = {".json", ".quoin", ".vox"}
 
 
+def _comparable(one):
+    """Converts faces and shapes to values that can be compared: images become hashes."""
+    if isinstance(one, np.ndarray):
+        return hashlib.sha256(one).digest()
+    if isinstance(one, quoin.Face):
+        return tuple(map(_comparable, one[:6]))
+    if isinstance(one, dict):
+        return tuple(sorted((name, _comparable(each)) for name, each in one.items()))
+    return tuple(map(_comparable, one)) if isinstance(one, tuple) else one
+
+
 class _Writer:
     def __init__(self, path, options):
         self.options = options
@@ -36,13 +47,20 @@ class _Writer:
         self._grids = {}  # by mesh and materials
         self._places = 0
 
-    def type_number(self, one, faces=None):
-        key = (tuple(one), faces and tuple((hashlib.sha256(face.image).digest(), *face[1:6]) for face in faces))
-        if key not in self._types:
-            self._types[key] = self.scene.add_type(one)
-            if faces is not None:
-                self.scene.set_faces(self._types[key], faces)
-        return self._types[key]
+    def type_number(self, one, form):
+        key = (tuple(one), _comparable(form))
+        if key in self._types:
+            return self._types[key]
+        number = self._types[key] = self.scene.add_type(one)
+        if form.faces is not None:
+            self.scene.set_faces(number, form.faces)
+        if form.orientations is not None:
+            self.scene.set_orientations(number, form.orientations)
+        if form.shapes is not None:
+            self.scene.set_shapes(number, form.shapes)
+            if one.blocks_light is not None:
+                self.scene.set_type(number, self.scene.types[number]._replace(blocks_light=one.blocks_light))
+        return number
 
     def can_place(self, matrix):
         """Returns true if the format supports this placement. Otherwise the object is voxelized in place."""
@@ -69,8 +87,10 @@ class _Writer:
             types = [materials.edited(one, slots[slot]) if 0 <= slot < len(slots) else one
                      for one, slot in zip(found.types, found.slots)]
             self._warn_of_images(slots, {slot for slot in found.slots if slot >= 0}, name)
-            numbers = np.array([0] + [self.type_number(*one) for one in zip(types, found.faces)], np.uint16)
+            numbers = np.array([0] + [self.type_number(*one) for one in zip(types, found.forms)], np.uint16)
             grid = self.scene.add(numbers[found.voxels], name=mesh.name)
+            if found.states is not None:
+                grid.write_states(found.states, (0, 0, 0))
             # The array starts at `origin`; grids start at 0.
             moved = np.eye(4)
             moved[:3, 3] = found.origin

@@ -22,6 +22,17 @@ class Imported:
         self.warnings = []
 
 
+_NO_TEXTURE = 2**32 - 1
+
+
+def _faces_of(form):
+    """Returns the textured faces of a type and its shapes, by texture and tint."""
+    faces = list(form.faces or ())
+    for part in form.shapes.parts if form.shapes else ():
+        faces += [look for element in part.elements for look in element.looks.values() if isinstance(look, quoin.Face)]
+    return {(one.texture, tuple(one.tint)): one for one in reversed(faces)}
+
+
 class _Looks:
     """The materials of one import, created on first use."""
 
@@ -29,9 +40,10 @@ class _Looks:
         types = scene.types
         self.name, self.types, self.scale = name, types, options.scale
         self.textures = scene.textures()
-        self.faces = [self.textures.faces(i) for i in range(len(types))]
-        self.is_textured = np.array([one is not None for one in self.faces])
-        self._of_faces, self._images = {}, {}
+        self.forms = [kept.Form(self.textures.faces(i), self.textures.shapes(i), scene.orientations(i))
+                      for i in range(len(types))]
+        self._faces = [_faces_of(one) for one in self.forms]  # of each type, by texture and tint
+        self._rows, self._of_rows, self._of_faces, self._images = [], {}, {}, {}
         self.group = materials.occlusion_group(options.occlusion)
         is_palette = options.materials == "PALETTE" or (
             options.materials == "AUTO" and len(types) > materials.MOST_MATERIALS)
@@ -40,9 +52,9 @@ class _Looks:
         self._smooth = None
 
     def of(self, number):
-        """Returns the material of a type, or of a textured face (see `number_of_faces`)."""
+        """Returns the material of a type, or of faces with a look of their own (see `numbers_of`)."""
         if number >= len(self.types):
-            return self._of_face(*divmod(number - len(self.types), 6))
+            return self._of_row(*self._rows[number - len(self.types)])
         one = self.types[number]
         if self.palette is not None and not one.transparent:
             return self.palette.material
@@ -50,12 +62,36 @@ class _Looks:
             self._of[number] = materials.of_type(one, number, self.group, self.scale)
         return self._of[number]
 
-    def number_of_faces(self, types, directions):
-        """Returns numbers for `of`: the types, and for textured types other numbers of their faces."""
-        return np.where(self.is_textured[types], len(self.types) + 6 * types + directions, types)
+    def numbers_of(self, types, textures, tints):
+        """Returns numbers for `of`: the types, and other numbers for faces with a texture, or with a colour that is not
+        the type's."""
+        colours = np.array([one.rgba[:3] for one in self.types], np.uint8)
+        is_own = (textures != _NO_TEXTURE) | (tints[:, :3] != colours[types]).any(1)
+        found = types.copy()
+        if is_own.any():
+            kinds, kind = np.unique(textures[is_own], return_inverse=True)
+            red, green, blue = tints[is_own, :3].astype(np.int64).T
+            packed = (types[is_own] * len(kinds) + kind) << 24 | red << 16 | green << 8 | blue
+            packed, row = np.unique(packed, return_inverse=True)
+            numbers = []
+            for each in packed.tolist():
+                number, kind = divmod(each >> 24, len(kinds))
+                key = (number, int(kinds[kind]), (each >> 16 & 255, each >> 8 & 255, each & 255))
+                numbers.append(self._of_rows.setdefault(key, len(self.types) + len(self._rows)))
+                if numbers[-1] == len(self.types) + len(self._rows):
+                    self._rows.append(key)
+            found[is_own] = np.array(numbers)[row]
+        return found
 
-    def _of_face(self, number, direction):
-        one, face = self.types[number], self.faces[number][direction]
+    def _of_row(self, number, texture, tint):
+        one = self.types[number]
+        face = self._faces[number].get((texture, tint))
+        if face is None:  # a colour
+            key = (tint, *one[2:])
+            if key not in self._of_faces:
+                coloured = one._replace(rgba=(*tint, one.rgba[3]))
+                self._of_faces[key] = materials.of_type(coloured, number, self.group, self.scale)
+            return self._of_faces[key]
         key = (face.texture, face.image.shape, face.tint, face.alpha, one.emission, one.metalness, one.roughness)
         if key not in self._of_faces:
             image = key[:3]
@@ -107,12 +143,6 @@ def _open(found, blocks):
 def _colours(mesh, name, values):
     layer = mesh.color_attributes.new(name, "FLOAT_COLOR", "POINT")
     layer.data.foreach_set("color", np.ascontiguousarray(values, np.float32).ravel())
-
-
-def _directions(normals):
-    """Returns the numbers of the directions of unit normals along axes: +X, -X, +Y, -Y, +Z, -Z."""
-    axis = np.abs(normals).argmax(1)
-    return 2 * axis + (normals[np.arange(len(normals)), axis] < 0.0)
 
 
 def _slots(mesh, looks, face_types, faces):
@@ -170,7 +200,7 @@ def mesh_of(grid, name, looks, options):
     face_types = np.zeros(0, np.int64) if blocks == 0 else found.types[:blocks:4].astype(np.int64)
     face_looks = face_types
     if found.textures is not None:
-        face_looks = looks.number_of_faces(face_types, _directions(found.normals[:blocks:4]))
+        face_looks = looks.numbers_of(face_types, found.textures[:blocks:4], found.tints[:blocks:4])
     slots = _slots(mesh, looks, face_looks, faces)
     if found.textures is not None:
         layer = mesh.uv_layers.new(name=materials.TEXTURE, do_init=False)
@@ -199,7 +229,7 @@ def mesh_of(grid, name, looks, options):
 def _keep(mesh, grid, looks, slots, options, made):
     if not options.keep_voxels or not grid.voxel_count:
         return
-    if not kept.keep(mesh, grid, looks.types, options.scale, slots, looks.faces):
+    if not kept.keep(mesh, grid, looks.types, options.scale, slots, looks.forms):
         made.warnings.append(f"{mesh.name}: cannot keep the voxels in the .blend: too many or too scattered; export "
                              "will voxelize the mesh")
 
