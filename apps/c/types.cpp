@@ -146,7 +146,7 @@ quoin_status with_type(quoin_scene scene, std::size_t type, const void* out, Wor
   });
 }
 
-// Replaces a type by what `change` makes of its properties; if they are not valid, nothing changes.
+// Lets `change` edit the properties of a type. If they are then not valid, nothing changes.
 template <class Change>
 quoin_status change_type(quoin_scene scene, std::size_t type, Change&& change) noexcept {
   return with_scene(scene, Use::Change, [&](SceneBody& body) {
