@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -31,7 +32,25 @@ VoxelType outcome(const Brush& brush, VoxelType current) {
   return current;
 }
 
+// Returns true if a voxel that the brush covers becomes the brush's type with the brush's state.
+bool gets_state(const Brush& brush, VoxelType current) {
+  if (brush.action == BrushAction::Place) return current == kAir && brush.state != 0;
+  if (brush.action != BrushAction::Paint || current == kAir) return false;
+  return current == brush.type ? !brush.turns : brush.state != 0;
+}
+
 }  // namespace
+
+std::uint32_t state_of(const Brush& brush, const SceneHit& hit, DVec3 look, const Instance& instance,
+                       const SceneGrid& grid, const VoxelRegistry& types) {
+  if (brush.action != BrushAction::Place || !brush.turns || brush.type >= types.size()) return brush.state;
+  PlacingHit at{.face = hit.face};
+  if (const auto ray = ray_in_grid(instance, grid, {hit.position, look})) {
+    at.point = Vec3(ray->origin - DVec3(hit.voxel));
+    at.look = ray->direction;
+  }
+  return placed_state(types[brush.type], at, brush.state);
+}
 
 IBox reach_of(const Brush& brush, IVec3 centre) {
   const int radius = std::clamp(brush.radius, 0, kMaxBrush);
@@ -46,11 +65,22 @@ std::int64_t apply(const Brush& brush, IVec3 centre, Grid& grid) {
   // Half a voxel more than the radius, so that spheres look round rather than pointed.
   const double reach = std::clamp(brush.radius, 0, kMaxBrush) + 0.5;
   const bool is_sphere = brush.shape == BrushShape::Sphere;
-  return grid.edit(box, [&](IVec3 voxel, VoxelType current) {
+  std::vector<IVec3> stated;     // voxels that get the brush's state
+  std::int64_t only_stated = 0;  // of these, voxels that keep their type
+  const std::int64_t changed = grid.edit(box, [&](IVec3 voxel, VoxelType current) {
     const DVec3 offset(voxel - centre);
     if (is_sphere && glm::dot(offset, offset) > reach * reach) return current;
-    return outcome(brush, current);
+    const VoxelType next = outcome(brush, current);
+    if (gets_state(brush, current) && (next != current || grid.data(voxel).state != brush.state)) {
+      stated.push_back(voxel);
+      only_stated += next == current ? 1 : 0;
+    }
+    return next;
   });
+  for (const IVec3 voxel : stated) {
+    grid.set(voxel, grid.get(voxel), {.state = brush.state, .bytes = grid.data(voxel).bytes});
+  }
+  return changed + only_stated;
 }
 
 IVec3 target_of(BrushAction action, IVec3 voxel, Direction face) {

@@ -36,12 +36,34 @@ struct Brush {
   BrushShape shape = BrushShape::Box;
   int radius = 0;  ///< voxels beyond the middle one, 0 (one voxel) to kMaxBrush
   VoxelType type = 1;
+  std::uint32_t state = 0;  ///< of placed and painted voxels
+  /// True if placed voxels turn to the face that is touched (`placed_state`). False for a picked state: strokes keep
+  /// it, and painting also gives it to voxels that have the brush's type.
+  bool turns = true;
+
+  /// Selects a type, whose voxels turn to the face that is touched.
+  void choose(VoxelType chosen) {
+    type = chosen;
+    state = 0;
+    turns = true;
+  }
+  /// Selects the type and the state of a voxel.
+  void choose(VoxelType chosen, std::uint32_t chosen_state) {
+    type = chosen;
+    state = chosen_state;
+    turns = false;
+  }
 };
+
+/// Returns the state of voxels that a brush places or paints when it touches `hit` in the direction `look`, in the
+/// world.
+[[nodiscard]] std::uint32_t state_of(const Brush& brush, const SceneHit& hit, DVec3 look, const Instance& instance,
+                                     const SceneGrid& grid, const VoxelRegistry& types);
 
 /// Returns the box of voxels that a brush at `centre` can change, clipped to the coordinate range.
 [[nodiscard]] IBox reach_of(const Brush& brush, IVec3 centre);
 
-/// Applies a brush. Returns the number of voxels changed.
+/// Applies a brush. Returns the number of voxels whose type or state changed.
 std::int64_t apply(const Brush& brush, IVec3 centre, Grid& grid);
 
 /// Returns the voxel of a stroke's first touch: for Place the one in front of the hit face, otherwise the hit voxel.

@@ -113,7 +113,7 @@ std::string Document::name() const {
   return path_.empty() ? "empty scene" : path_.filename().string();
 }
 
-bool Document::begin_stroke(const Brush& brush, const SceneHit& hit) {
+bool Document::begin_stroke(const Brush& brush, const SceneHit& hit, DVec3 look) {
   end_stroke();
   if (why_not_edited() != nullptr) return false;
   const Instance* instance = scene().instances().find(hit.instance);
@@ -129,6 +129,7 @@ bool Document::begin_stroke(const Brush& brush, const SceneHit& hit) {
   if (brush.action == BrushAction::Smooth || brush.action == BrushAction::Flatten) return false;
   const IVec3 target = target_of(brush.action, hit.voxel, hit.face);
   stroke_ = Stroke{brush, instance->grid, hit.instance, {hit.voxel, hit.face}, target, {}, {}};
+  stroke_->brush.state = state_of(brush, hit, look, *instance, scene().grids()[instance->grid], scene().types);
   history_.begin(name_of(brush.action));
   touch(target);
   return true;
@@ -226,7 +227,7 @@ Result<VoxelType> Document::type_of_colour(Rgba8 colour, float emission) {
   for (std::size_t type = 1; type < scene().types.size(); ++type) {
     const VoxelProperties& known = scene().types[static_cast<VoxelType>(type)];
     // The colour of a textured type is only a mean.
-    const bool is_plain = known.visibility == Visibility::Opaque && known.faces.empty();
+    const bool is_plain = known.visibility == Visibility::Opaque && known.faces.empty() && known.shapes.empty();
     if (is_plain && known.colour == colour && known.emission == emission) return static_cast<VoxelType>(type);
   }
   VoxelProperties properties;

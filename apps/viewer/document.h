@@ -66,8 +66,8 @@ class Document {
 
   /// Begins a stroke with its first touch at `hit`, on voxels or on the surface of a field. Returns false and begins
   /// none if the instance or its grid is gone, the brush's type is not registered, or the action works on fields only
-  /// and voxels were hit.
-  bool begin_stroke(const Brush& brush, const SceneHit& hit);
+  /// and voxels were hit. `look`: direction of the view at the hit, in the world; voxels turn by it (Brush::turns).
+  bool begin_stroke(const Brush& brush, const SceneHit& hit, DVec3 look = DVec3(0.0));
   /// Continues the stroke without gaps to the point where a ray of the world meets the layer or plane of the first
   /// touch, or to `hit` if the action follows the surface. Returns the number of voxels changed.
   std::int64_t drag_to(const Ray& ray_in_world, const std::optional<SceneHit>& hit);

@@ -539,5 +539,114 @@ TEST(Document, PaintsColoursWithoutTextures) {
   EXPECT_TRUE(document.scene().types[painted].faces.empty());
 }
 
+// The types of small_scene, then a torch (5), a slab (6) and stairs (7).
+Document document_of_shapes() {
+  LoadedScene loaded = small_scene();
+  VoxelRegistry& types = loaded.scene.types;
+  const auto add = [&](VoxelProperties type) { (void)types.add(std::move(type)).value(); };
+  add({.name = "torch",
+       .state_bits = 3,
+       .orientations = StateOrientations::to_directions(),
+       .shapes = VoxelShape::box({7, 0, 7}, {9, 10, 9})});
+  add({.name = "slab",
+       .state_bits = 1,
+       .orientations = {.by_value = {AxisOrientation(), AxisOrientation::quarter_turns(0, 2)}},
+       .shapes = VoxelShape::box({0, 0, 0}, {16, 8, 16})});
+  add({.name = "stairs",
+       .state_bits = 3,
+       .orientations = StateOrientations::about_y_and_upside_down(),
+       .shapes = VoxelShape::boxes({{{0, 0, 0}, {16, 8, 16}}, {{8, 8, 0}, {16, 16, 16}}})});
+  return {std::move(loaded), "hill.vox"};
+}
+
+// A hit of an instance's voxel at a point of its face, given in the grid.
+SceneHit hit_at(const Document& document, std::size_t instance, IVec3 voxel, Direction face, DVec3 point) {
+  SceneHit hit = hit_at(document, voxel, face);
+  hit.instance = document.scene().instances().handles()[instance];
+  const Instance& placed = document.scene().instances()[hit.instance];
+  hit.position = world_from_grid(placed, document.scene().grids()[placed.grid], DVec3(voxel) + point);
+  return hit;
+}
+
+TEST(Document, PlacesShapesInTheOrientationOfTheFace) {
+  for (const std::size_t instance : {0U, 1U}) {  // the second is turned and mirrored
+    Document document = document_of_shapes();
+    const Instance& placed = document.scene().instances()[document.scene().instances().handles()[instance]];
+    const SceneGrid& grid = document.scene().grids()[placed.grid];
+    const auto look = [&](DVec3 in_grid) {
+      return world_from_grid(placed, grid, in_grid) - world_from_grid(placed, grid, DVec3(0.0));
+    };
+    const auto place = [&](VoxelType type, Direction face, double height, DVec3 looks) {
+      Brush brush;
+      brush.choose(type);
+      const IVec3 voxel{52, 7, 10};
+      EXPECT_TRUE(
+          document.begin_stroke(brush, hit_at(document, instance, voxel, face, {0.5, height, 0.0}), look(looks)));
+      document.end_stroke();
+      const IVec3 at = voxel + normal_of(face);
+      EXPECT_EQ(only_grid(document).get(at), type);
+      const std::uint32_t state = only_grid(document).data(at).state;
+      EXPECT_TRUE(document.undo());
+      EXPECT_EQ(only_grid(document).get(at), kAir);
+      EXPECT_TRUE(document.redo());
+      EXPECT_EQ(only_grid(document).data(at).state, state) << "undo keeps states";
+      EXPECT_TRUE(document.undo());
+      return state;
+    };
+    EXPECT_EQ(place(5, Direction::NegZ, 0.3, {0.8, 0.0, 0.7}), 5U) << "a torch points away from the wall";
+    EXPECT_EQ(place(6, Direction::NegZ, 0.3, {0.0, 0.0, 1.0}), 0U);
+    EXPECT_EQ(place(6, Direction::NegZ, 0.7, {0.0, 0.0, 1.0}), 1U) << "the upper half";
+    EXPECT_EQ(place(7, Direction::NegZ, 0.3, {0.2, -0.5, 1.0}), 3U) << "the high side is away from the player";
+    EXPECT_EQ(place(7, Direction::NegZ, 0.7, {0.9, -0.5, 0.1}), 4U);
+  }
+}
+
+TEST(Document, PlacesAndPaintsPickedStates) {
+  Document document = document_of_shapes();
+  Brush brush;
+  brush.choose(7, 6);
+  const auto stroke = [&](IVec3 voxel) {
+    ASSERT_TRUE(document.begin_stroke(brush, hit_at(document, 0, voxel, Direction::PosY, {0.5, 1.0, 0.5}), {1, 0, 0}));
+    document.end_stroke();
+  };
+  stroke({2, 3, 2});
+  EXPECT_EQ(only_grid(document).data({2, 4, 2}).state, 6U);
+  brush.radius = 1;
+  stroke({20, 5, 2});  // a cube in the air
+  EXPECT_EQ(only_grid(document).get({21, 7, 3}), 7);
+  EXPECT_EQ(only_grid(document).data({21, 7, 3}).state, 6U);
+  brush.radius = 0;
+  // Painting gives the state to voxels of the same type and of others.
+  brush.action = BrushAction::Paint;
+  brush.choose(7, 1);
+  stroke({2, 4, 2});
+  EXPECT_EQ(only_grid(document).data({2, 4, 2}).state, 1U);
+  stroke({2, 3, 2});
+  EXPECT_EQ(only_grid(document).get({2, 3, 2}), 7);
+  EXPECT_EQ(only_grid(document).data({2, 3, 2}).state, 1U);
+  EXPECT_TRUE(document.undo());
+  EXPECT_TRUE(document.undo());
+  EXPECT_EQ(only_grid(document).data({2, 4, 2}).state, 6U);
+  // A type from the palette keeps the states of its own voxels.
+  brush.choose(7);
+  stroke({2, 4, 2});
+  EXPECT_EQ(only_grid(document).data({2, 4, 2}).state, 6U);
+  Grid grid;
+  grid.set({0, 0, 0}, 7, {.state = 1});
+  brush.choose(7, 5);
+  EXPECT_EQ(apply(brush, {0, 0, 0}, grid), 1) << "a change of the state counts";
+  EXPECT_EQ(apply(brush, {0, 0, 0}, grid), 0);
+}
+
+TEST(Document, NewColoursAreNotShapes) {
+  LoadedScene loaded = small_scene();
+  const VoxelType half =
+      loaded.scene.types
+          .add({.name = "slab", .colour = {1, 2, 3, 255}, .shapes = VoxelShape::box({0, 0, 0}, {16, 8, 16})})
+          .value();
+  Document document(std::move(loaded), "hill.vox");
+  EXPECT_NE(document.type_of_colour({1, 2, 3, 255}).value(), half);
+}
+
 }  // namespace
 }  // namespace quoin::viewer

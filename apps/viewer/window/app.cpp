@@ -416,7 +416,15 @@ void App::look_through(const Camera& camera) {
 
 void App::pick_type() {
   if (!state_.hover) return state_.report("no voxel under the mouse");
-  state_.brush.type = state_.hover->type;
+  const SceneHit& hit = *state_.hover;
+  const Instance* const instance = state_.scene().instances().find(hit.instance);
+  const SceneGrid* const grid = instance == nullptr ? nullptr : state_.scene().grids().find(instance->grid);
+  if (hit.in_field || grid == nullptr) return state_.brush.choose(hit.type);
+  // A picked state stays as it is; voxels of types without states turn to the face.
+  const VoxelType type = hit.type;
+  const bool has_state = type < state_.scene().types.size() && state_.scene().types[type].state_bits > 0;
+  if (!has_state) return state_.brush.choose(type);
+  state_.brush.choose(type, grid->grid.data(hit.voxel).state);
 }
 
 const char* ViewState::why_not_drawn_as(DrawMode mode) const {

@@ -147,7 +147,7 @@ void App::adopt(OpenDocument opened) {
       state_.open.environment = environment;
     }
   }
-  state_.brush.type = 1;
+  state_.brush.choose(1);
   state_.tool = Tool::Look;  // the first click into a world should not change it
   const SDL_Point output = screen_->output_size();
   if (!state_.has_image_place()) state_.image_place = {0, 0, std::max(output.x, 1), std::max(output.y, 1)};

@@ -26,7 +26,7 @@ constexpr std::array kCommands = {
     CommandInfo{Command::BrushSmaller, "Smaller brush", "[", SDLK_LEFTBRACKET, false, false},
     CommandInfo{Command::BrushLarger, "Larger brush", "]", SDLK_RIGHTBRACKET, false, false},
     CommandInfo{Command::BrushShape, "Box or sphere", "B", SDLK_b, false, false},
-    CommandInfo{Command::PickType, "Pick the type under the mouse", "I", SDLK_i, false, false},
+    CommandInfo{Command::PickType, "Pick the voxel under the mouse", "I", SDLK_i, false, false},
     CommandInfo{Command::CameraMode, "Orbit, fly or walk", "C", SDLK_c, false, false},
     CommandInfo{Command::Focus, "Look at the point under the mouse", "F", SDLK_f, false, false},
     CommandInfo{Command::ViewIso, "Show all", "Home", SDLK_HOME, false, false},
@@ -164,8 +164,9 @@ void Editing::begin(ViewState& state) {
   report_copies(state, *hit);
   Brush brush = state.brush;
   brush.action = *action;
+  const Ray ray = ray_through(state.camera.camera(), {from_.x, from_.y, state.image_place.w, state.image_place.h});
   edit_paused(state, [&](Document& document) {
-    if (!document.begin_stroke(brush, *hit)) {
+    if (!document.begin_stroke(brush, *hit, ray.direction)) {
       const bool is_of_fields = *action == BrushAction::Smooth || *action == BrushAction::Flatten;
       state.report(is_of_fields && !hit->in_field ? "cannot smooth or flatten blocks: only smooth ground"
                                                   : "no voxel type to place: choose a colour");

@@ -57,7 +57,7 @@ void draw_palette(ViewState& state) {
     if ((i - 1) % static_cast<std::size_t>(across) != 0) ImGui::SameLine();
     ImGui::PushID(static_cast<int>(i));
     const ImGuiColorEditFlags flags = ImGuiColorEditFlags_NoTooltip | ImGuiColorEditFlags_NoDragDrop;
-    if (ImGui::ColorButton("type", colour_of(scene.types[type]), flags, {edge, edge})) state.brush.type = type;
+    if (ImGui::ColorButton("type", colour_of(scene.types[type]), flags, {edge, edge})) state.brush.choose(type);
     if (ImGui::IsItemHovered()) describe_type(scene, type);
     if (type == state.brush.type) {
       // Scrolls to a type that was chosen elsewhere.
@@ -72,13 +72,24 @@ void draw_palette(ViewState& state) {
   ImGui::PopStyleVar();
 }
 
+/// Draws a switch between turning to the face and the picked state, for types that their state turns.
+void draw_turns(ViewState& state) {
+  Brush& brush = state.brush;
+  if (!state.scene().types.is_turned_by_state(brush.type)) return;
+  ImGui::Checkbox("turn to the face", &brush.turns);
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("off: places the state of the picked voxel");
+  if (brush.turns) return;
+  ImGui::SameLine();
+  ImGui::TextDisabled("state %u", brush.state);
+}
+
 /// Selects a type of that colour for the brush. Pauses rendering, because the type registry is part of the scene.
 void choose_new_type(ViewState& state, Rgba8 colour, float emission) {
   const ScenePause pause(*state.open.backend);
   state.stats.is_settled = false;
   const auto type = state.open.document->type_of_colour(colour, emission);
   if (!type) return state.report(type.error());
-  state.brush.type = *type;
+  state.brush.choose(*type);
   const char* what = emission > 0.0F ? "selected lamp type " : "selected colour type ";
   state.report(what + std::to_string(*type));
 }
@@ -180,6 +191,7 @@ void draw_tool_part(ViewState& state, MenuChoice& choice) {
   int shape = static_cast<int>(state.brush.shape);
   if (ImGui::Combo("shape", &shape, "box\0sphere\0")) state.brush.shape = static_cast<BrushShape>(shape);
   ImGui::SliderInt("radius", &state.brush.radius, 0, kMaxBrush, "%d", ImGuiSliderFlags_AlwaysClamp);
+  draw_turns(state);
   draw_palette(state);
   draw_new_colour(state);
   const EditHistory& history = state.open.document->history();

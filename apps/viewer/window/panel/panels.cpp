@@ -104,6 +104,9 @@ std::string hover_text(const ViewState& state) {
   std::snprintf(text.data(), text.size(), "%s %d, %d, %d   type %d", hit.in_field ? "sample" : "voxel", hit.voxel.x,
                 hit.voxel.y, hit.voxel.z, type);
   std::string line = text.data();
+  if (const std::uint32_t word = hit.in_field ? 0 : grid->grid.data(hit.voxel).state; word != 0) {
+    line += " state " + std::to_string(word);
+  }
   if (type < state.scene().types.size() && type != kAir) {
     const VoxelProperties& properties = state.scene().types[type];
     const Rgba8 colour = properties.colour;
@@ -364,6 +367,35 @@ void draw_sphere(const WorldLines& lines, const Instance& instance, const SceneG
   }
 }
 
+/// Returns the shape of the voxel under the mouse, or of the one that the tool would place in front of it. Null: a cube.
+/// A placed shape is shown without connections to its neighbours.
+const ShapeModel* outlined_shape(const ViewState& state, const Instance& instance, const SceneGrid& grid) {
+  const SceneHit& hit = *state.hover;
+  const VoxelRegistry& types = state.scene().types;
+  if (state.tool != Tool::Place) return shape_at(grid.grid, types, hit.voxel);
+  Brush brush = state.brush;
+  brush.action = BrushAction::Place;
+  if (!types.is_shaped(brush.type)) return nullptr;
+  const SDL_Rect& place = state.image_place;
+  const Ray ray = ray_through(state.camera.camera(), {state.mouse.x, state.mouse.y, place.w, place.h});
+  const std::uint32_t voxel_state = state_of(brush, hit, ray.direction, instance, grid, types);
+  const VoxelProperties& type = types[brush.type];
+  return &type.shapes.model(voxel_state, type.orientations.of(voxel_state), {});
+}
+
+void draw_shape(const WorldLines& lines, const Instance& instance, const SceneGrid& grid, IVec3 voxel,
+                const ShapeModel& model, ImU32 colour) {
+  for (const ModelFace& face : model.faces) {
+    if (face.is_inner) continue;
+    for (std::size_t i = 0; i < face.corners.size(); ++i) {
+      const auto corner = [&](std::size_t number) {
+        return world_from_grid(instance, grid, DVec3(voxel) + DVec3(face.corners[number % face.corners.size()]));
+      };
+      if (face.corners[i] != face.corners[(i + 1) % 4]) lines.draw(corner(i), corner(i + 1), colour);
+    }
+  }
+}
+
 }  // namespace
 
 void draw_outline(const ViewState& state) {
@@ -390,6 +422,9 @@ void draw_outline(const ViewState& state) {
     }
   } else if (is_brush && state.brush.shape == BrushShape::Sphere && radius > 0) {
     draw_sphere(lines, *instance, *grid, DVec3(voxel) + 0.5, radius + 0.5, colour);
+  } else if (const ShapeModel* const model = radius == 0 ? outlined_shape(state, *instance, *grid) : nullptr;
+             model != nullptr && !model->faces.empty()) {
+    draw_shape(lines, *instance, *grid, voxel, *model, colour);
   } else {
     draw_box(lines, *instance, *grid, {DVec3(voxel - radius), DVec3(voxel + radius + 1)}, colour);
   }
