@@ -21,7 +21,8 @@ QUOIN_API void quoin_web_listen(int32_t listens);
 QUOIN_API void* quoin_web_struct(int32_t kind);
 
 /* Prepares a scene for ray-marching shaders (page/march.js), until quoin_web_march_free: the tables declared in
- * src/render/shaders/data.glsl, with 32-bit addresses. The scene stays alive and must not be edited. */
+ * src/render/shaders/data.glsl, with 32-bit addresses. The scene stays alive and must not be edited. Fails if its types
+ * have shapes, which the shaders lack. */
 typedef struct quoin_web_march quoin_web_march;
 QUOIN_API quoin_status quoin_web_march_begin(quoin_scene scene, quoin_web_march** out);
 /* Returns the data shared by all images. `has` receives bits: transparent voxels, fields, transparent fields. */

@@ -39,6 +39,8 @@ quoin_status quoin_web_march_begin(quoin_scene scene, quoin_web_march** out) {
     auto body = handles().find<SceneBody>(scene);
     if (body == nullptr) return fail(QUOIN_BAD_HANDLE, "no scene has this handle");
     if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
+    if (body->loaded.scene.types.has_shapes())
+      return fail(QUOIN_UNSUPPORTED, "the shaders draw shapes of voxel types as cubes");
     auto shaders = vulkan::ShaderScene::of(body->loaded.scene, InstanceFilter::Visible, natural_light(), {});
     if (!shaders) return fail(shaders.error());
     *out = new quoin_web_march{std::move(body), std::move(*shaders), {}};
