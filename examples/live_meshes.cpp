@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -77,9 +78,13 @@ int main(int argc, char** argv) {
   quoin::LiveMeshOptions options;
   options.convert = [&](const quoin::SurfaceUpdate& update) {  // on a worker
     const quoin::QuadBuffer& quads = update.surface->quads;
-    const std::size_t bytes = writer.bytes_needed(quoin::vertices_needed(quads.size()));
+    const quoin::ShapeFaceBuffer& shapes = update.surface->shapes;  // of types that are no cubes
+    const std::size_t bytes_of_quads = writer.bytes_needed(quoin::vertices_needed(quads.size()));
+    const std::size_t bytes = writer.bytes_needed(quoin::vertices_needed(quads.size() + shapes.size()));
     auto vertices = std::make_shared<std::vector<std::byte>>(bytes);
-    writer.write(quads, quoin::Vec3(update.chunk * quoin::kChunkEdge), *vertices);
+    const quoin::Vec3 origin(update.chunk * quoin::kChunkEdge);
+    writer.write(quads, origin, *vertices);
+    writer.write(shapes, origin, std::span(*vertices).subspan(bytes_of_quads));
     return quoin::ConvertedSurface(vertices, bytes);  // `take` counts these bytes
   };
   quoin::LiveMeshes meshes(options);

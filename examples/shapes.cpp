@@ -169,12 +169,22 @@ quoin::Result<int> run() {
   quoin::SceneGrid entry{.name = "yard", .grid = yard(scene.types, *blocks)};
   const quoin::ShapeModel* const corner = quoin::shape_at(entry.grid, scene.types, {0, 1, 1});
   std::printf("boxes of the fence's corner: %zu\n", corner->boxes.size());
-  scene.add_instance({.name = "yard", .grid = scene.add_grid(std::move(entry))});
+  const quoin::GridHandle grid = scene.add_grid(std::move(entry));
+  scene.add_instance({.name = "yard", .grid = grid});
   const auto meshes = quoin::mesh_scene(scene);
   if (!meshes) return meshes.error();
   const auto mesh = quoin::write_mesh(*meshes, "shapes.glb");
   if (!mesh) return mesh.error();
   std::printf("quads: %lld\n", static_cast<long long>(meshes->stats.quads));
+  // A game's renderer receives the faces of shapes with the quads, again after each edit: the door closes.
+  quoin::LiveMeshes live;
+  for (const std::uint32_t state : {0b100U, 0U}) {
+    for (int y = 1; y < 3; ++y) scene.edit(grid).grid.set_data({8, y, 5}, {.state = state});
+    live.finish(scene, {});
+    for (const quoin::SurfaceUpdate& update : live.take()) {
+      std::printf("faces of shapes: %zu\n", update.surface->shapes.size());
+    }
+  }
   return 0;
 }
 

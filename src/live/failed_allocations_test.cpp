@@ -47,6 +47,7 @@
 
 #include "core/coordinates/chunk_order.h"
 #include "core/memory/block_arena_for_tests.h"
+#include "grid/shapes/shape_types_for_tests.h"
 #include "live/allocations_for_tests.h"
 #include "live/live_test_support.h"
 #include "render/light/emissive_cells.h"
@@ -127,7 +128,7 @@ constexpr VoxelType kGlass = 3;
 /// A scene of a few small grids, and random edits of all parts that consumers follow.
 class BusyScene {
  public:
-  BusyScene() {
+  explicit BusyScene(bool has_shapes = false) {
     for (const auto& [visibility, emission] :
          {std::pair{Visibility::Opaque, 0.0F}, {Visibility::Opaque, 1.0F}, {Visibility::Transparent, 0.0F}}) {
       VoxelProperties properties;
@@ -136,6 +137,9 @@ class BusyScene {
       properties.visibility = visibility;
       properties.emission = emission;
       EXPECT_TRUE(scene.types.add(properties));
+    }
+    if (has_shapes) {
+      EXPECT_TRUE(scene.types.add({.name = "fence", .shapes = shapes_for_tests::fence()}));
     }
     for (int i = 0; i < 3; ++i) {
       SceneGrid grid;
@@ -147,7 +151,8 @@ class BusyScene {
   }
 
   void edit() {
-    scene.edit(scene.grids().handles().front()).grid.set(voxel(), static_cast<VoxelType>(below(4)));
+    const std::size_t types = scene.types.size();
+    scene.edit(scene.grids().handles().front()).grid.set(voxel(), static_cast<VoxelType>(below(types)));
     for (int i = 0; i < 3 && !edits_voxels_only; ++i) {
       const auto grids = scene.grids().handles();
       const auto instances = scene.instances().handles();
@@ -156,7 +161,7 @@ class BusyScene {
         case 0:
         case 1:
         case 2:
-          grid.grid.set(voxel(), static_cast<VoxelType>(below(4)));
+          grid.grid.set(voxel(), static_cast<VoxelType>(below(types)));
           break;
         case 3:
           grid.grid.fill_box({{56, 4, 2}, voxel() + IVec3(1, 2, 1)}, kGlass);
@@ -711,12 +716,13 @@ TEST(FailedAllocations, KeepPyramid) {
 bool has_same_surfaces(const ShownSurfaces& a, const ShownSurfaces& b) {
   return std::ranges::equal(a.all(), b.all(), [](const SurfaceUpdate& x, const SurfaceUpdate& y) {
     return x.grid == y.grid && x.chunk == y.chunk && x.content == y.content && x.surface->quads == y.surface->quads &&
+           x.surface->shapes == y.surface->shapes &&
            x.surface->smooth.positions.size() == y.surface->smooth.positions.size();
   });
 }
 
 TEST(FailedAllocations, KeepLiveMeshes) {
-  BusyScene busy;
+  BusyScene busy(true);
   LiveMeshOptions options;
   options.workers = {1};
   LiveMeshes meshes(options);
@@ -754,7 +760,7 @@ bool has_same_quads(const ShownSurfaces& lit, const Scene& scene) {
 // Surfaces and light that a failed call would have shown are shown by the next one.
 TEST(FailedAllocations, KeepTakenMeshes) {
   for (const bool is_lit : {false, true}) {
-    BusyScene busy;
+    BusyScene busy(true);
     LiveLight light({{}, {1}});
     LiveMeshOptions options;
     options.workers = {1};
@@ -792,7 +798,7 @@ TEST(FailedAllocations, KeepTakenMeshes) {
 
 // A game that calls `update` only while surfaces are pending still sees every edit.
 TEST(FailedAllocations, KeepLitMeshesPendingIfWorkersFail) {
-  BusyScene busy;
+  BusyScene busy(true);
   LiveLight light({{}, {1}});
   LiveMeshOptions options;
   options.workers = {1};

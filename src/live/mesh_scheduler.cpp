@@ -211,6 +211,7 @@ LiveMeshOptions without_callbacks(const LiveMeshOptions& options) {
 ChunkSurfaceOptions surface_options(const LiveMeshOptions& options) {
   return {.style = options.style,
           .merge = options.merge,
+          .shapes = options.shapes,
           .region_edge = options.region_edge,
           .light_merging = options.light_merging,
           .occlusion = options.occlusion,
@@ -383,7 +384,7 @@ void MeshScheduler::follow(const State& state, const Scene& places) {
   const ChangedTypes changed_types = follow_types(state.scene->types);
   follow_scene(*state.scene);
   for (const GridHandle handle : changed_) follow_grid(*state.scene, handle, now);
-  follow_light(state.light, now);
+  follow_light(state.light, state.scene->types, now);
   choose_levels(places, now);
   if (!changed_types.empty()) mark_types(*state.scene, changed_types, now);
   withdraw([&](const SurfaceJob& job) {
@@ -493,20 +494,20 @@ void MeshScheduler::follow_grid(const Scene& scene, GridHandle handle, SurfaceCl
     field = (sources_[key] = make_surface_source(key, surface_options_, totals_)).get();
   }
   totals_.loads_only = is_all_new_ && is_new;
-  voxels->second->follow(grid, now);
+  voxels->second->follow(grid, scene.types, now);
   voxels->second->follow_data(grid, scene.types, now);
-  if (field != nullptr) field->follow(grid, now);
+  if (field != nullptr) field->follow(grid, scene.types, now);
   totals_.loads_only = false;
 }
 
-void MeshScheduler::follow_light(const SceneLight* light, SurfaceClock::time_point now) {
+void MeshScheduler::follow_light(const SceneLight* light, const VoxelRegistry& types, SurfaceClock::time_point now) {
   // The light of a worker's state does not change, that of the caller may.
   const bool may_change = light != nullptr && light_worker_ == nullptr;
   if (light == followed_light_ && !must_follow_light_ && !may_change) return;
   followed_light_ = light;
   must_follow_light_ = false;
   for (auto& [key, live] : sources_) {
-    live->follow_light(light == nullptr ? GridLight{} : light->of(key.grid), now);
+    live->follow_light(light == nullptr ? GridLight{} : light->of(key.grid), types, now);
   }
 }
 
@@ -582,6 +583,12 @@ ChangedTypes MeshScheduler::follow_types(const VoxelRegistry& types) {
   // Other orientations give other quads.
   add(changed.visibility, &TypeChange::shape_changed);
   add(changed.colour, &TypeChange::colour_changed);
+  // So do other faces that a voxel's state turns: quads tell orientations apart only if they look different.
+  for (const TypeChange& change : changes->items_unless_all()) {
+    if (!change.colour_changed || !types.is_turned_by_state(change.type) || types.is_shaped(change.type)) continue;
+    changed.visibility.resize(types.size());
+    changed.visibility[change.type] = true;
+  }
   changed.data = types_with_new_data(types_.registry.get(), types);
   types_.registry = std::make_shared<const VoxelRegistry>(types);
   if (!changed.colour.empty()) types_.materials = std::make_shared<const SurfaceMaterials>(types);

@@ -139,7 +139,7 @@ class MeshScheduler {
   [[nodiscard]] ChangedTypes follow_types(const VoxelRegistry& types);
   void follow_scene(const Scene& scene);
   void follow_grid(const Scene& scene, GridHandle handle, SurfaceClock::time_point now);
-  void follow_light(const SceneLight* light, SurfaceClock::time_point now);
+  void follow_light(const SceneLight* light, const VoxelRegistry& types, SurfaceClock::time_point now);
   void mark_types(const Scene& scene, const ChangedTypes& changed, SurfaceClock::time_point now);
   void prepare(const Scene& scene);
   void choose_levels(const Scene& scene, SurfaceClock::time_point now);

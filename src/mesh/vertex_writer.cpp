@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <initializer_list>
 #include <numeric>
 #include <optional>
+#include <unordered_map>
 #include <utility>
 
 #include <glm/common.hpp>
@@ -48,34 +48,35 @@ struct PerVertex {
 template <class ValueOf>
 PerVertex(Column, std::size_t, ValueOf) -> PerVertex<ValueOf>;
 
-template <class ValueOf>
+// `Face`: Quad or ShapeFace.
+template <class Face, class ValueOf>
 struct PerQuad {
   Column column;
-  std::span<const Quad> quads;
+  std::span<const Face> quads;
   ValueOf value_of;
 
   template <class Value, class Convert>
   void put(Convert&& convert) const {
     std::byte* at = column.at;
-    for (const Quad quad : quads) {
+    for (const Face& quad : quads) {
       const Value value = convert(value_of(quad));
       for (int corner = 0; corner < 4; ++corner, at += column.stride) std::memcpy(at, &value, sizeof value);
     }
   }
 };
-template <class ValueOf>
-PerQuad(Column, std::span<const Quad>, ValueOf) -> PerQuad<ValueOf>;
+template <class Face, class ValueOf>
+PerQuad(Column, std::span<const Face>, ValueOf) -> PerQuad<Face, ValueOf>;
 
-template <class ValuesOf>
+template <class Face, class ValuesOf>
 struct PerCorner {
   Column column;
-  std::span<const Quad> quads;
+  std::span<const Face> quads;
   ValuesOf values_of;  // four
 
   template <class Value, class Convert>
   void put(Convert&& convert) const {
     std::byte* at = column.at;
-    for (const Quad quad : quads) {
+    for (const Face& quad : quads) {
       for (const auto& of_corner : values_of(quad)) {
         const Value value = convert(of_corner);
         std::memcpy(at, &value, sizeof value);
@@ -84,8 +85,8 @@ struct PerCorner {
     }
   }
 };
-template <class ValuesOf>
-PerCorner(Column, std::span<const Quad>, ValuesOf) -> PerCorner<ValuesOf>;
+template <class Face, class ValuesOf>
+PerCorner(Column, std::span<const Face>, ValuesOf) -> PerCorner<Face, ValuesOf>;
 
 using Float3 = std::array<float, 3>;
 using Float4 = std::array<float, 4>;
@@ -513,19 +514,151 @@ void VertexWriter::write(const MeshView& mesh, Vec3 origin, std::span<std::byte>
   write_view(mesh, origin, out);
 }
 
-VertexWriter::FacesOfView VertexWriter::faces_of(const MeshView& mesh) const {
-  FacesOfView faces;
-  if (mesh.looks.empty()) return faces;
-  faces.tints.resize(layout_.elements.size());
+void VertexWriter::add_face(const VoxelFace& face, OwnFaces& to) const {
+  to.tints.resize(layout_.elements.size());
+  bool has_texture = false;
   for (std::size_t i = 0; i < layout_.elements.size(); ++i) {
     const VertexElement& element = layout_.elements[i];
-    if (element.attribute == VertexAttribute::Texture && faces.textures.empty()) {
-      for (const VoxelFace& face : mesh.faces) faces.textures.push_back(number_in(layers_, face));
+    has_texture |= element.attribute == VertexAttribute::Texture;
+    if (element.attribute == VertexAttribute::Tint) to.tints[i].push_back(encoded(face.tint, element.format));
+  }
+  if (has_texture) to.textures.push_back(number_in(layers_, face));
+}
+
+VertexWriter::OwnFaces VertexWriter::faces_of(const MeshView& mesh) const {
+  OwnFaces faces;
+  if (mesh.looks.empty()) return faces;
+  for (const VoxelFace& face : mesh.faces) add_face(face, faces);
+  return faces;
+}
+
+// Sets `numbers` to the number of each face's look in the result: 1 + an index, or 0 for looks of types.
+VertexWriter::OwnFaces VertexWriter::faces_of(std::span<const ShapeFace> shapes,
+                                              std::vector<std::uint32_t>& numbers) const {
+  OwnFaces faces;
+  std::unordered_map<const VoxelFace*, std::uint32_t> known;
+  numbers.reserve(shapes.size());
+  for (const ShapeFace& shape : shapes) {
+    const ModelFace& face = shape.model_face();
+    if (face.look < 6) {
+      numbers.push_back(0);
+      continue;
     }
-    if (element.attribute != VertexAttribute::Tint) continue;
-    for (const VoxelFace& face : mesh.faces) faces.tints[i].push_back(encoded(face.tint, element.format));
+    const VoxelFace& look = shape.model->looks[face.look - std::size_t{6}];
+    const auto [number, is_new] = known.try_emplace(&look, static_cast<std::uint32_t>(known.size() + 1));
+    if (is_new) add_face(look, faces);
+    numbers.push_back(number->second);
   }
   return faces;
+}
+
+// Faces of shapes that are written together.
+struct VertexWriter::ShapeBlock {
+  std::span<const ShapeFace> shapes;
+  std::span<const std::uint32_t> numbers;  // of their looks in `faces`, as `faces_of` sets them; empty if not needed
+  const OwnFaces* faces;
+
+  [[nodiscard]] std::uint32_t number_of(const ShapeFace& shape) const {
+    return numbers[static_cast<std::size_t>(&shape - shapes.data())];
+  }
+};
+
+void VertexWriter::write(std::span<const ShapeFace> faces, Vec3 origin, std::span<std::byte> out) const {
+  QUOIN_ASSERT(can_write(layout_, VertexSource::Shapes), "a layout for faces of shapes");
+  QUOIN_ASSERT(out.size() >= bytes_needed(vertices_needed(faces.size())), "out holds 4 vertices per face");
+  const bool has_looks = std::ranges::any_of(layout_.elements, [](const VertexElement& each) {
+    return each.attribute == VertexAttribute::Texture || each.attribute == VertexAttribute::Tint;
+  });
+  std::vector<std::uint32_t> numbers;
+  const OwnFaces own = has_looks ? faces_of(faces, numbers) : OwnFaces();
+  by_blocks(faces.size(), 4, layout_.stride, out.data(), [&](std::size_t first, std::size_t count, std::byte* block) {
+    const auto of_block =
+        has_looks ? std::span<const std::uint32_t>(numbers).subspan(first, count) : std::span<const std::uint32_t>();
+    const ShapeBlock shapes{faces.subspan(first, count), of_block, &own};
+    for (std::size_t i = 0; i < layout_.elements.size(); ++i) write_element(i, shapes, origin, block);
+  });
+}
+
+std::array<std::array<float, 2>, 4> VertexWriter::texture_uvs(const ShapeFace& face) const {
+  const ModelFace& shown = face.model_face();
+  if (shown.look >= 6) return shown.uv;
+  const std::uint8_t packed = turn(face_number(face.type, static_cast<Direction>(shown.look)));
+  VoxelFace look;
+  look.turn = packed % 4;
+  look.mirrored = packed >= 4;
+  std::array<std::array<float, 2>, 4> coordinates{};
+  for (std::size_t i = 0; i < 4; ++i) coordinates[i] = texture_uv(shown, look, shown.uv[i]);
+  return coordinates;
+}
+
+namespace {
+
+// Positions of the corners of shapes' faces.
+std::array<Vec3, 4> corners_of(const ShapeFace& face, Vec3 origin) {
+  return {face.corner(0) + origin, face.corner(1) + origin, face.corner(2) + origin, face.corner(3) + origin};
+}
+
+// Voxels from the voxel's lowest corner along u and v.
+std::array<std::array<float, 2>, 4> uvs_of(const ShapeFace& face) {
+  const ModelFace& shown = face.model_face();
+  const FaceFrame& frame = frame_of(shown.direction);
+  std::array<std::array<float, 2>, 4> uvs{};
+  for (std::size_t i = 0; i < 4; ++i) uvs[i] = {shown.corners[i][frame.u], shown.corners[i][frame.v]};
+  return uvs;
+}
+
+}  // namespace
+
+void VertexWriter::write_element(std::size_t index, const ShapeBlock& block, Vec3 origin, std::byte* out) const {
+  const VertexElement& element = layout_.elements[index];
+  const Column column{out + element.offset, layout_.stride};
+  const VertexFormat format = element.format;
+  const std::span<const ShapeFace> faces = block.shapes;
+  const auto number_of = [](const ShapeFace& face) {
+    return std::pair(face.type, static_cast<Direction>(face.model_face().look));
+  };
+  const auto same = [](const std::array<float, 2>& uv) { return uv; };
+  switch (element.attribute) {
+    case VertexAttribute::Position:
+      return put_positions(format,
+                           PerCorner{column, faces, [&](const ShapeFace& face) { return corners_of(face, origin); }});
+    case VertexAttribute::Normal:
+      return put_normals(format,
+                         PerQuad{column, faces, [](const ShapeFace& face) { return face.model_face().normal; }});
+    case VertexAttribute::Face:
+      return put_numbers(format,
+                         PerQuad{column, faces, [](const ShapeFace& face) { return face.model_face().direction; }});
+    case VertexAttribute::Colour:
+      return put_encoded(format, PerQuad{column, faces, [&](const ShapeFace& face) -> const Colour& {
+                                           return colour(index, face.type);
+                                         }});
+    case VertexAttribute::Occlusion:
+    case VertexAttribute::Brightness:
+      return put_block_occlusion(format,
+                                 PerCorner{column, faces, [](const ShapeFace& face) { return face.occlusion(); }});
+    case VertexAttribute::Type:
+      return put_numbers(format, PerQuad{column, faces, [](const ShapeFace& face) { return face.type; }});
+    case VertexAttribute::Uv:
+      return PerCorner{column, faces, [](const ShapeFace& face) { return uvs_of(face); }}.put<std::array<float, 2>>(
+          same);
+    case VertexAttribute::Texture:
+      return put_numbers(format, PerQuad{column, faces, [&](const ShapeFace& face) {
+                                           const std::uint32_t own = block.number_of(face);
+                                           if (own != 0) return block.faces->textures[own - 1];
+                                           const auto [type, direction] = number_of(face);
+                                           return texture(face_number(type, direction));
+                                         }});
+    case VertexAttribute::TextureUv:
+      return PerCorner{column, faces, [&](const ShapeFace& face) { return texture_uvs(face); }}
+          .put<std::array<float, 2>>(same);
+    case VertexAttribute::Tint:
+      return put_encoded(format, PerQuad{column, faces, [&](const ShapeFace& face) -> const Colour& {
+                                           const std::uint32_t own = block.number_of(face);
+                                           if (own != 0) return block.faces->tints[index][own - 1];
+                                           const auto [type, direction] = number_of(face);
+                                           return colour(index, face_number(type, direction));
+                                         }});
+  }
 }
 
 void VertexWriter::write_view(const MeshView& mesh, Vec3 origin, std::span<std::byte> out) const {
@@ -534,7 +667,7 @@ void VertexWriter::write_view(const MeshView& mesh, Vec3 origin, std::span<std::
   // A vertex's face is found by its triangles, so for all vertices at once.
   std::vector<std::array<float, 2>> uvs;
   if (std::ranges::any_of(layout_.elements, has_uvs)) uvs = texture_uvs(mesh);
-  const FacesOfView faces = faces_of(mesh);
+  const OwnFaces faces = faces_of(mesh);
   by_blocks(mesh.positions.size(), 1, layout_.stride, out.data(),
             [&](std::size_t first, std::size_t count, std::byte* block) {
               for (std::size_t i = 0; i < layout_.elements.size(); ++i) {
@@ -550,7 +683,7 @@ void VertexWriter::write_view(const MeshView& mesh, Vec3 origin, std::span<std::
             });
 }
 
-void VertexWriter::write_element(std::size_t index, const MeshView& mesh, const FacesOfView& faces, std::size_t first,
+void VertexWriter::write_element(std::size_t index, const MeshView& mesh, const OwnFaces& faces, std::size_t first,
                                  std::size_t count, Vec3 origin, std::byte* block) const {
   const VertexElement& element = layout_.elements[index];
   const Column column{block + element.offset, layout_.stride};
@@ -608,90 +741,6 @@ void VertexWriter::write_shading(VertexFormat format, const MeshView& mesh, std:
   const PerVertex brightness{column, count, brightness_of};
   if (format == VertexFormat::Float32) return brightness.put<float>([](float share) { return share; });
   brightness.put<std::uint8_t>([](float share) { return unorm8(share); });
-}
-
-namespace {
-
-using enum VertexFormat;
-
-bool is_one_of(VertexFormat format, std::initializer_list<VertexFormat> formats) {
-  return std::find(formats.begin(), formats.end(), format) != formats.end();
-}
-
-bool can_write(const VertexElement& element, VertexSource source) {
-  const VertexFormat format = element.format;
-  const bool is_smooth = source == VertexSource::SmoothChunk || source == VertexSource::Smooth;
-  switch (element.attribute) {
-    case VertexAttribute::Position:
-      return is_one_of(format, {Float32x3, Float32x4}) ||
-             (source == VertexSource::Quads && is_one_of(format, {Sint16x4, Uint8x4}));
-    case VertexAttribute::Normal:
-      return is_one_of(format, {Float32x3, Float32x4, Snorm8x4});
-    case VertexAttribute::Face:
-      return !is_smooth && is_one_of(format, {Uint8, Uint32});
-    case VertexAttribute::Colour:
-      return source != VertexSource::SmoothChunk && is_one_of(format, {Float32x4, Unorm16x4, Unorm8x4, Unorm8x4Srgb});
-    case VertexAttribute::Occlusion:
-      return !is_smooth && format == Uint8;
-    case VertexAttribute::Brightness:
-      return is_one_of(format, {Float32, Unorm8});
-    case VertexAttribute::Type:
-      return !is_smooth && is_one_of(format, {Uint16, Uint32});
-    case VertexAttribute::Uv:
-      return source == VertexSource::Quads && is_one_of(format, {Float32x2, Uint8x2});
-    case VertexAttribute::Texture:
-      return !is_smooth && is_one_of(format, {Uint16, Uint32});
-    case VertexAttribute::TextureUv:
-      return !is_smooth && format == Float32x2;
-    case VertexAttribute::Tint:
-      return !is_smooth && is_one_of(format, {Float32x4, Unorm16x4, Unorm8x4, Unorm8x4Srgb});
-  }
-  return false;
-}
-
-}  // namespace
-
-std::size_t size_of(VertexFormat format) {
-  switch (format) {
-    case Uint8:
-    case Unorm8:
-      return 1;
-    case Uint8x2:
-    case Uint16:
-      return 2;
-    case Float32x2:
-    case Sint16x4:
-    case Unorm16x4:
-      return 8;
-    case Float32x3:
-      return 12;
-    case Float32x4:
-      return 16;
-    case Float32:
-    case Uint8x4:
-    case Uint32:
-    case Snorm8x4:
-    case Unorm8x4:
-    case Unorm8x4Srgb:
-      return 4;
-  }
-  return 0;
-}
-
-bool can_write(const VertexLayout& layout, VertexSource source) {
-  if (layout.stride < 1 || layout.stride > VertexLayout::kMaxStride) return false;
-  std::vector<bool> is_taken(layout.stride);
-  for (const VertexElement& element : layout.elements) {
-    const std::size_t size = size_of(element.format);
-    if (!can_write(element, source) || element.offset > layout.stride || size > layout.stride - element.offset) {
-      return false;
-    }
-    for (std::size_t i = element.offset; i < element.offset + size; ++i) {
-      if (is_taken[i]) return false;
-      is_taken[i] = true;
-    }
-  }
-  return true;
 }
 
 }  // namespace quoin

@@ -1,5 +1,6 @@
 #include <quoin/mesh/vertex_writer.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -12,6 +13,7 @@
 #include <quoin/mesh/blocky.h>
 
 #include "core/death_for_tests.h"
+#include "grid/shapes/shape_types_for_tests.h"
 #include "mesh/mesh_oracle.h"
 
 namespace quoin {
@@ -261,6 +263,121 @@ TEST(VertexWriter, WritesLooksOfViews) {
     EXPECT_EQ(read<Vec3>(bytes, 28 * i + 16), normal_at(view, i));
     if (view.looks[i].face == 0) continue;
     EXPECT_EQ((read<std::array<float, 2>>(bytes, 28 * i + 4)), view.looks[i].uv);
+  }
+}
+
+// Types with random shapes, with textures of their own and of the type.
+Grid shaped_world(VoxelRegistry& types) {
+  types = textured_types();
+  ShapeTypes shapes(types);
+  VoxelProperties stairs = types[shapes.stairs];
+  stairs.faces = types[2].faces;
+  types.replace(shapes.stairs, stairs);
+  ShapeElement post{.min = {4, 0, 4}, .max = {12, 16, 12}, .turn = ElementTurn{.axis = 1, .degrees = 30.0F}};
+  const VoxelFace drawn{.texture = Texture::from_image("s", noise(16, 9)).value(), .tint = {90, 80, 70, 255}};
+  post.faces.fill({.face = drawn});
+  post.faces[2].face->tint.r = 1;
+  const VoxelType own = types.add({.name = "post", .shapes = VoxelShape::from_elements({post}).value()}).value();
+  Grid grid;
+  std::mt19937 random(6);
+  for (int i = 0; i < 500; ++i) {
+    const IVec3 at(random() % 12, random() % 12, random() % 12);
+    const auto type = static_cast<VoxelType>(random() % (own + 1U));
+    const std::uint32_t states = (1U << types[type].state_bits) - 1;
+    if (type != kAir) grid.set(at, type, {.state = static_cast<std::uint32_t>(random()) & states});
+  }
+  return grid;
+}
+
+TEST(VertexWriter, WritesShapesLikeViews) {
+  VoxelRegistry types;
+  const Grid grid = shaped_world(types);
+  TextureSet textures;
+  textures.add(types);
+  const VertexLayout layout{55,
+                            {{VertexAttribute::Position, Float32x3, 0},
+                             {VertexAttribute::Normal, Float32x3, 12},
+                             {VertexAttribute::Texture, Uint32, 24},
+                             {VertexAttribute::Tint, Unorm16x4, 28},
+                             {VertexAttribute::Colour, Unorm8x4, 36},
+                             {VertexAttribute::Brightness, Float32, 40},
+                             {VertexAttribute::Type, Uint16, 44},
+                             {VertexAttribute::Face, Uint8, 46},
+                             {VertexAttribute::TextureUv, Float32x2, 47}}};
+  ASSERT_TRUE(can_write(layout, VertexSource::Shapes));
+  const VertexWriter writer(layout, types, textures);
+  const auto mesh = build_blocky_mesh(grid, types, {});
+  QuadBuffer quads;
+  ShapeFaceBuffer all;
+  BlockyMesher().mesh(grid.neighbourhood(IVec3(0)), types, {}, quads, all);
+  std::size_t textured = 0;
+  for (std::size_t which = 0; which < kSurfaceClasses; ++which) {
+    const auto surface = static_cast<SurfaceClass>(which);
+    ShapeFaceBuffer faces = all;
+    std::erase_if(faces, [&](const ShapeFace& face) { return surface_class(types[face.type]) != surface; });
+    const MeshView view = view_of(mesh->surfaces[which], surface);
+    const std::size_t vertices = vertices_needed(faces.size());
+    ASSERT_GE(view.positions.size(), vertices);
+    const std::size_t first = view.positions.size() - vertices;  // shapes come last
+    const Vec3 origin(8.0F, -16.0F, 0.5F);
+    std::vector<std::byte> expected(writer.bytes_needed(view.positions.size()));
+    writer.write(view, origin, expected);
+    std::vector<std::byte> found(writer.bytes_needed(vertices));
+    writer.write(faces, origin, found);
+    for (std::size_t i = 0; i < vertices; ++i) {
+      const ShapeFace& face = faces[i / 4];
+      const bool has_look = look_of(*face.model, face.model_face(), types[face.type].faces) != nullptr;
+      textured += has_look ? 1 : 0;
+      const std::size_t at = 55 * (first + i);
+      ASSERT_EQ(read<Vec3>(found, 55 * i), read<Vec3>(expected, at));
+      ASSERT_EQ(read<Vec3>(found, 55 * i + 12), read<Vec3>(expected, at + 12));
+      // Coordinates count only where there is a texture.
+      for (std::size_t byte = 24; byte < (has_look ? 55 : 47); ++byte) {
+        ASSERT_EQ(found[55 * i + byte], expected[at + byte]) << "vertex " << i << ", byte " << byte;
+      }
+    }
+    std::vector<std::uint32_t> indices(indices_needed(faces.size()));
+    write_indices<std::uint32_t>(std::span<const ShapeFace>(faces), first, indices);
+    std::vector<std::uint32_t> triangles;  // those with an area
+    for (std::size_t i = 0; i < indices.size(); i += 3) {
+      if (i % 6 == 3 && faces[i / 6].is_triangle()) continue;
+      triangles.insert(triangles.end(), &indices[i], &indices[i] + 3);
+    }
+    ASSERT_GE(view.indices.size(), triangles.size());
+    EXPECT_TRUE(std::ranges::equal(triangles, view.indices.last(triangles.size())));
+  }
+  EXPECT_GT(textured, 400U);
+  EXPECT_GT(vertices_needed(all.size()), textured + 400);
+}
+
+TEST(VertexWriter, WritesShapesInFractionsOfVoxels) {
+  using Attribute = VertexAttribute;
+  EXPECT_FALSE(can_write({8, {{Attribute::Position, Sint16x4, 0}}}, VertexSource::Shapes));
+  EXPECT_FALSE(can_write({4, {{Attribute::Position, Uint8x4, 0}}}, VertexSource::Shapes));
+  EXPECT_FALSE(can_write({2, {{Attribute::Uv, Uint8x2, 0}}}, VertexSource::Shapes));
+  const VertexLayout layout{12, {{Attribute::Uv, Float32x2, 0}, {Attribute::Occlusion, Uint8, 9}}};
+  ASSERT_TRUE(can_write(layout, VertexSource::Shapes));
+  VoxelRegistry types;
+  const VoxelType slab = types.add({.name = "slab", .shapes = VoxelShape::box({0, 0, 0}, {16, 8, 16})}).value();
+  Grid grid;
+  grid.set({1, 2, 3}, slab);
+  QuadBuffer quads;
+  ShapeFaceBuffer faces;
+  BlockyMesher().mesh(grid.neighbourhood(IVec3(0)), types, {}, quads, faces);
+  ASSERT_EQ(faces.size(), 6U);
+  const VertexWriter writer(layout, types);
+  std::vector<std::byte> found(writer.bytes_needed(vertices_needed(faces.size())), std::byte{9});
+  writer.write(faces, Vec3(0.0F), found);
+  for (std::size_t i = 0; i < 24; ++i) {
+    const ModelFace& face = faces[i / 4].model_face();
+    const FaceFrame& frame = frame_of(face.direction);
+    const auto uv = read<std::array<float, 2>>(found, 12 * i);
+    EXPECT_EQ(uv[0], face.corners[i % 4][frame.u]);
+    EXPECT_EQ(uv[1], face.corners[i % 4][frame.v]);
+    if (frame.axis != 1) {
+      EXPECT_EQ(uv[frame.u == 1 ? 0 : 1] == 0.5F, face.corners[i % 4].y == 0.5F);
+    }
+    EXPECT_EQ(read<std::uint32_t>(found, 12 * i + 8), 0U);
   }
 }
 

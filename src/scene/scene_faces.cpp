@@ -50,18 +50,6 @@ bool has_any_of(const Grid& grid, const TypeChanges& changes) {
          });
 }
 
-// Adds the chunks whose faces shapes may hide otherwise than before. A shape follows its neighbours, also their state.
-void add_chunks_near(IVec3 chunk, const IBox& box, std::vector<IVec3>& chunks) {
-  const IVec3 origin = chunk * kChunkEdge;
-  const IVec3 first = chunk_of(origin + box.min - 2);
-  const IVec3 last = chunk_of(origin + box.max + 1);
-  for (int z = first.z; z <= last.z; ++z) {
-    for (int y = first.y; y <= last.y; ++y) {
-      for (int x = first.x; x <= last.x; ++x) chunks.emplace_back(x, y, z);
-    }
-  }
-}
-
 /// Counts the chunks at `first`, `first + step` and so on.
 void count_chunks(std::vector<ChunkCount>& chunks, std::size_t first, std::size_t step, const VoxelRegistry& types,
                   BlockyMesher& mesher) {
@@ -115,8 +103,9 @@ void SceneFaces::Impl::follow(const Scene& scene, GridHandle handle, std::vector
   }
   std::vector<IVec3> near = chunks_to_mesh(entry->grid, changes);
   if (scene.types.has_shapes() && !changes.all) {
-    for (const ChunkChange& change : changes.items_unless_all()) add_chunks_near(change.chunk, change.box, near);
-    for (const DataChange& change : data.items_unless_all()) add_chunks_near(change.chunk, change.box, near);
+    const auto add = [&](const auto& change) { add_chunks_near(change.chunk, change.box, kShapeReach, near); };
+    for (const ChunkChange& change : changes.items_unless_all()) add(change);
+    for (const DataChange& change : data.items_unless_all()) add(change);
     sort_and_unite(near);
   }
   for (const IVec3 chunk : near) chunks.push_back({&entry->grid, &faces, chunk, 0});

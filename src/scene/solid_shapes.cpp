@@ -287,15 +287,7 @@ std::vector<IVec3> SolidShapes::Impl::chunks_to_make(const Grid& grid, const Gri
                                                      const DataChanges& data) const {
   std::vector<IVec3> chunks = chunks_to_mesh(grid, changes);
   // Shapes follow the state of their neighbours.
-  for (const DataChange& change : data.items_unless_all()) {
-    const IVec3 low = change.chunk * kChunkEdge;
-    const IBox near{chunk_of(low + change.box.min - 1), chunk_of(low + change.box.max) + 1};
-    for (int z = near.min.z; z < near.max.z; ++z) {
-      for (int y = near.min.y; y < near.max.y; ++y) {
-        for (int x = near.min.x; x < near.max.x; ++x) chunks.emplace_back(x, y, z);
-      }
-    }
-  }
+  for (const DataChange& change : data.items_unless_all()) add_chunks_near(change.chunk, change.box, 1, chunks);
   if (!data.empty()) sort_and_unite(chunks);
   if (!changes.all) return chunks;
   for (const auto& [chunk, shape] : shapes) {

@@ -92,6 +92,8 @@ using GridChanges = Changes<ChunkChange>;
 /// The result contains every changed chunk, even if it no longer exists. It also contains each existing chunk with
 /// one of the 26 neighbours of a changed voxel. In a partial grid, an unloaded chunk adds its neighbours too, because
 /// their meshes must be removed. If everything changed, the result is all chunks of the grid.
+/// Shapes: meshes of types with shapes also depend on voxels up to kShapeReach away, and on the state of voxels
+///         (Grid::data_changes_since). LiveMeshes follows both.
 /// Requires: `changes` lead up to the grid's present state.
 [[nodiscard]] std::vector<IVec3> chunks_to_mesh(const Grid& grid, const GridChanges& changes);
 

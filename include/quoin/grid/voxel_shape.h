@@ -28,6 +28,9 @@ inline constexpr int kMaxShapeUnit = 32;
 inline constexpr std::size_t kMaxShapeElements = 128;
 /// Maximum number of parts of a type's shapes (ShapeRules::parts).
 inline constexpr std::size_t kMaxShapeParts = 64;
+/// Distance, in voxels on each axis, up to which a change of a voxel or its state changes faces of shapes, and faces of
+/// cubes next to shapes: a shape follows its neighbours, and covers and darkens theirs.
+inline constexpr int kShapeReach = 2;
 
 /// One side of an element.
 struct ElementFace {
@@ -263,6 +266,7 @@ struct ShapeModel {
   IBox cells{IVec3{0}, IVec3{1}};  ///< voxels that boxes and faces touch, relative to the own one
   Vec3 min{0.0F};                  ///< bounds, in voxels
   Vec3 max{0.0F};
+  std::uint64_t hash = 0;  ///< of `faces` and `looks`, the same in every process
 
   [[nodiscard]] bool empty() const { return faces.empty() && boxes.empty(); }
 };

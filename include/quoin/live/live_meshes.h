@@ -14,6 +14,7 @@
 #include <quoin/core/parallel.h>
 #include <quoin/core/vec.h>
 #include <quoin/live/live_light.h>
+#include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth_mesh.h>
 #include <quoin/render/chunk_surface.h>
 #include <quoin/render/propagated_light.h>
@@ -33,8 +34,8 @@ struct ConvertedSurface {
 };
 
 /// A function that converts surfaces: any callable with one of these parameter lists, returning a ConvertedSurface or a
-/// pointer that converts to it. Use the second one to add content that quads do not contain, such as stairs, flowers,
-/// rotated blocks, or materials per vertex.
+/// pointer that converts to it. Use the second one to add content that surfaces do not contain, such as models of a game's own,
+/// or materials per vertex.
 ///
 ///   [](const quoin::SurfaceUpdate& update) { ... }
 ///   [](const quoin::SurfaceUpdate& update, const quoin::SurfaceContext& context) { ... }
@@ -79,6 +80,8 @@ class SurfaceConverter {
 struct LiveMeshOptions {
   SurfaceStyle style = SurfaceStyle::Blocky;  ///< of voxels
   bool merge = true;                          ///< blocky: neighbouring faces become one quad
+  /// Blocky: Faces fills ChunkSurface::shapes. Cubes is for renderers that do not draw shapes.
+  ShapeUse shapes = ShapeUse::Faces;
   /// Blocky: 16, 32 or 64. Edge of the regions that a renderer replaces after an edit (SurfaceUpdate::changed_regions),
   /// in voxels. Use 64 if it uploads whole chunks. Figures: docs/guide.md, "Blocky meshes".
   int region_edge = 16;
@@ -144,7 +147,7 @@ class LiveMeshes {
   LiveMeshes& operator=(const LiveMeshes&) = delete;
 
   /// Applies the scene's changes since the last update: voxels, data of types with VoxelProperties::remesh_on_data,
-  /// grids, visibility of types (smooth: also colour), and instances that show a grid for the first time or no longer
+  /// grids, visibility, shapes and orientations of types (smooth: also colour), and instances that show a grid for the first time or no longer
   /// show it. Chunks nearest to an eye (world coordinates) come first. Call it after edits, and once per frame while
   /// `pending` is not 0: each call queues only enough chunks to keep the workers busy. Eyes that are not finite are
   /// ignored; if all are, every chunk has distance 0.

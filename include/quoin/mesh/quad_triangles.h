@@ -20,11 +20,11 @@ namespace [[gnu::visibility("default")]] quoin {
 /// The order of a triangle's corners, seen from its front.
 enum class Winding : std::uint8_t { CounterClockwise, Clockwise };
 
-/// Returns the number of vertices of `quads` quads: four each.
+/// Returns the number of vertices of `quads` quads, or faces of shapes: four each.
 [[nodiscard]] constexpr std::size_t vertices_needed(std::size_t quads) {
   return 4 * quads;
 }
-/// Returns the number of indices of `quads` quads: six each.
+/// Returns the number of indices of `quads` quads, or faces of shapes: six each.
 [[nodiscard]] constexpr std::size_t indices_needed(std::size_t quads) {
   return 6 * quads;
 }
@@ -114,6 +114,25 @@ void write_indices(std::span<const Quad> quads, std::size_t first_vertex, std::s
     for (std::size_t i = 0; i < 6; ++i) next[i] = static_cast<Index>(base + corners[i]);
     next += 6;
     base = static_cast<Index>(base + 4);
+  }
+}
+
+/// Writes six indices per face of a shape, as for quads. The second triangle of a face with three corners
+/// (ShapeFace::is_triangle) has no area.
+template <class Index>
+void write_indices(std::span<const ShapeFace> faces, std::size_t first_vertex, std::span<Index> out,
+                   Winding winding = Winding::CounterClockwise) {
+  static_assert(std::is_same_v<Index, std::uint16_t> || std::is_same_v<Index, std::uint32_t>);
+  QUOIN_ASSERT(out.size() >= indices_needed(faces.size()), "out holds 6 indices per face");
+  QUOIN_ASSERT(first_vertex + vertices_needed(faces.size()) <= std::numeric_limits<Index>::max(),
+               "indices fit their type");
+  Index* next = out.data();
+  for (const ShapeFace& face : faces) {
+    const bool is_flipped = !face.is_triangle() && flips_diagonal(face.occlusion());
+    for (const std::uint8_t corner : triangle_corners(is_flipped, winding)) {
+      *next++ = static_cast<Index>(first_vertex + corner);
+    }
+    first_vertex += 4;
   }
 }
 

@@ -28,7 +28,9 @@ enum class VertexAttribute : std::uint8_t {
   /// Brightness after occlusion: 1 - occlusion / 4 for blocks, 1 - occlusion for smooth meshes, 1 without occlusion.
   Brightness,
   Type,
-  Uv,  ///< voxels from the quad's corner 0, along its u and v: 0 to 64. For textures: see QuadVertex::u
+  /// Voxels from the quad's corner 0, along its u and v: 0 to 64. For textures: see QuadVertex::u. Of shapes: from the
+  /// lowest corner of the voxel, along u and v of the face's direction.
+  Uv,
   /// Layer of the face's texture (VoxelProperties::faces) in a TextureSet: TextureLayer::layer, in Uint32 plus
   /// TextureLayer::array << 16. Faces without a texture have the greatest number of the format, as have faces whose
   /// layer or array the format cannot hold: in Uint16 layers from 65,535 and all arrays except the first, in Uint32
@@ -39,7 +41,8 @@ enum class VertexAttribute : std::uint8_t {
   /// to the lowest corner of the face, which all triangles that share vertices form.
   TextureUv,
   /// Tint of the face; for types without textures their colour. The face shows tint times texture. For these three,
-  /// vertices of views with a look of their own (VertexLook) have the face that it names.
+  /// vertices of views with a look of their own (VertexLook) have the face that it names, and those of shapes the face
+  /// of `look_of`, with the coordinates of `texture_uv`.
   Tint,
 };
 
@@ -74,14 +77,14 @@ struct VertexElement {
 ///
 /// | attribute | formats | fourth component |
 /// |---|---|---|
-/// | Position | Float32x3, Float32x4; of quads also Sint16x4, Uint8x4 | 1 |
+/// | Position | Float32x3, Float32x4; of quads, not of shapes, also Sint16x4, Uint8x4 | 1 |
 /// | Normal | Float32x3, Float32x4, Snorm8x4 | 0 |
 /// | Face | Uint8, Uint32 | |
 /// | Colour | Float32x4, Unorm16x4, Unorm8x4 (linear), Unorm8x4Srgb | alpha |
 /// | Occlusion | Uint8 | |
 /// | Brightness | Float32, Unorm8 | |
 /// | Type | Uint16, Uint32 | |
-/// | Uv | Float32x2, Uint8x2 | |
+/// | Uv | Float32x2; of quads, not of shapes, also Uint8x2 | |
 /// | Texture | Uint16, Uint32 | |
 /// | TextureUv | Float32x2 | |
 /// | Tint | as Colour | 1 for faces with textures, else alpha |
@@ -98,6 +101,7 @@ enum class VertexSource : std::uint8_t {
   Blocks,       ///< MeshView of blocks: all except Uv; positions as floats
   SmoothChunk,  ///< SmoothChunkMesh: Position as floats, Normal, Brightness
   Smooth,       ///< MeshView of a smooth mesh: as SmoothChunk, plus Colour
+  Shapes,       ///< faces of shapes: has all attributes, with fractions of voxels
 };
 
 /// Returns true if vertices of this source can be written in the layout: the stride is in range, the elements lie
@@ -110,7 +114,10 @@ enum class VertexSource : std::uint8_t {
 /// Usage:    std::byte* mapped = map(writer.bytes_needed(vertices_needed(quads.size())));
 ///           writer.write(quads, Vec3(DVec3(chunk * kChunkEdge) - eye), {mapped, ...});
 ///           write_indices<std::uint16_t>(quads, 0, mapped_indices);
-/// Order:    vertices are in the order of `write_indices` (quad_triangles.h): four per quad, or the mesh's order.
+///           // Behind them, in the same layout, the faces of shapes:
+///           writer.write(shapes, Vec3(DVec3(chunk * kChunkEdge) - eye), {mapped + ..., ...});
+/// Order:    vertices are in the order of `write_indices` (quad_triangles.h): four per quad or face of a shape, or the
+///           mesh's order.
 /// Threads:  any number of threads can write with one writer.
 /// Faster:   for a layout known at compile time, use `for_each_vertex`.
 class VertexWriter {
@@ -128,6 +135,10 @@ class VertexWriter {
   /// Requires: `out` has at least `bytes_needed` bytes. For integer position formats, `origin` is whole and the sums
   ///           are in the format's range.
   void write(std::span<const Quad> quads, Vec3 origin, std::span<std::byte> out) const;
+  /// Writes four vertices per face of a shape, the corners in their order: the last two of a triangle are equal.
+  /// `origin`, in voxels, is added to positions (chunk coordinates).
+  /// Requires: can_write(layout, VertexSource::Shapes); `out` has at least `bytes_needed` bytes.
+  void write(std::span<const ShapeFace> faces, Vec3 origin, std::span<std::byte> out) const;
   /// Writes the mesh's vertices. `origin`, in samples, is added to positions.
   /// Requires: can_write(layout, VertexSource::SmoothChunk); `out` has at least `bytes_needed` bytes.
   void write(const SmoothChunkMesh& mesh, Vec3 origin, std::span<std::byte> out) const;
@@ -140,14 +151,21 @@ class VertexWriter {
   using Colour = std::array<std::byte, 16>;
 
   void write_element(std::size_t index, std::span<const Quad> quads, Vec3 origin, std::byte* block) const;
-  // The textures and tints of the faces that a view names (MeshView::faces).
-  struct FacesOfView {
+  // The textures and tints of faces that are in no table: those that a view names (MeshView::faces), or those of models
+  // (ShapeModel::looks).
+  struct OwnFaces {
     std::vector<std::uint32_t> textures;     // [face]
     std::vector<std::vector<Colour>> tints;  // [element][face]
   };
-  [[nodiscard, gnu::visibility("hidden")]] FacesOfView faces_of(const MeshView& mesh) const;
+  struct [[gnu::visibility("hidden")]] ShapeBlock;
+  [[gnu::visibility("hidden")]] void add_face(const VoxelFace& face, OwnFaces& to) const;
+  [[nodiscard, gnu::visibility("hidden")]] OwnFaces faces_of(const MeshView& mesh) const;
+  [[nodiscard, gnu::visibility("hidden")]] OwnFaces faces_of(std::span<const ShapeFace> shapes,
+                                                             std::vector<std::uint32_t>& numbers) const;
+  [[gnu::visibility("hidden")]] void write_element(std::size_t index, const ShapeBlock& shapes, Vec3 origin,
+                                                   std::byte* block) const;
   void write_view(const MeshView& mesh, Vec3 origin, std::span<std::byte> out) const;
-  void write_element(std::size_t index, const MeshView& mesh, const FacesOfView& faces, std::size_t first,
+  void write_element(std::size_t index, const MeshView& mesh, const OwnFaces& faces, std::size_t first,
                      std::size_t count, Vec3 origin, std::byte* block) const;
   void write_shading(VertexFormat format, const MeshView& mesh, std::size_t first, std::size_t count,
                      std::byte* at) const;
@@ -176,6 +194,7 @@ class VertexWriter {
     return number < turns_.size() ? turns_[number] : std::uint8_t{0};
   }
   [[nodiscard]] std::array<std::array<float, 2>, 4> texture_uvs(const Quad& quad) const;
+  [[nodiscard, gnu::visibility("hidden")]] std::array<std::array<float, 2>, 4> texture_uvs(const ShapeFace& face) const;
   [[nodiscard, gnu::visibility("hidden")]] std::vector<std::array<float, 2>> texture_uvs(const MeshView& mesh) const;
   void read_faces(const VoxelRegistry& types, const TextureSet& textures);
   // Calls `visit(face, type's properties)` for each number of a face; face is null for types without textures.
@@ -188,7 +207,7 @@ class VertexWriter {
   std::vector<std::size_t> turned_;      // by type: the number of its first face with an orientation, or 0
   std::vector<std::uint32_t> textures_;  // [face_number]; empty if no element needs them
   std::vector<std::uint8_t> turns_;      // [face_number]: turn + 4 * mirrored; empty if no element needs them
-  TextureSet layers_;                    // for the faces that views name; empty if types or elements need none
+  TextureSet layers_;                    // for OwnFaces; empty if types or elements need none
 };
 
 }  // namespace quoin

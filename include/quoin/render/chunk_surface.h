@@ -13,6 +13,7 @@
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/voxel_registry.h>
+#include <quoin/grid/voxel_shape.h>
 #include <quoin/mesh/quad.h>
 #include <quoin/mesh/smooth_mesh.h>
 #include <quoin/render/propagated_light.h>
@@ -36,7 +37,14 @@ struct SurfaceRegion {
   /// quads are [transparent[d], transparent[d + 1]). A renderer can skip directions that face away from the camera.
   std::array<std::uint32_t, 7> opaque{};
   std::array<std::uint32_t, 7> transparent{};
-  std::uint64_t hash = 0;  ///< hash of the region's quads and light
+  std::uint64_t hash = 0;  ///< hash of the region's quads, faces of shapes, and light
+};
+
+/// The faces of shapes of one region: the opaque ones are [opaque[0], opaque[1]) of the surface's shapes, the
+/// transparent ones [transparent[0], transparent[1]).
+struct RegionShapes {
+  std::array<std::uint32_t, 2> opaque{};
+  std::array<std::uint32_t, 2> transparent{};
 };
 
 /// The renderable surface of one chunk. Immutable.
@@ -49,7 +57,17 @@ struct ChunkSurface {
   QuadBuffer quads;
   std::size_t opaque_quads = 0;
   BlockVector<FaceLight> light;        ///< one per quad if LiveMeshes uses light; otherwise empty
-  BlockVector<SurfaceRegion> regions;  ///< blocky: regions that have quads, sorted by z, then y, then x
+  BlockVector<SurfaceRegion> regions;  ///< blocky: regions with quads or shapes, sorted by z, then y, then x
+  /// Blocky: visible faces of types with shapes, in the space of `quads`; see BlockyMesher::mesh. Faces of opaque
+  ///         material come before those of transparent material; each group is sorted by region, then voxel (z, y, x),
+  ///         then the order of the model. A face belongs to the region of its voxel, and may reach one voxel outside.
+  ShapeFaceBuffer shapes;
+  std::size_t opaque_shapes = 0;
+  /// Light at the corners of each face of `shapes`, in the order of ModelFace::corners (SurfaceLight::read), if
+  /// LiveMeshes uses light; otherwise empty.
+  BlockVector<FaceLight> shape_light;
+  BlockVector<RegionShapes> region_shapes;   ///< one per element of `regions` if there are shapes; otherwise empty
+  BlockVector<VoxelShapes> shapes_of_types;  ///< keep the models of `shapes`, also after types have changed
   /// Smooth: mesh point p is grid point p + 64 * chunk; for voxels p + 0.5 + 64 * chunk, because samples are voxel
   ///         centres. Each vertex has a linear colour and a type. Each transparent type is a closed body of its own.
   ///         Thin voxel features are kept (SmoothMeshOptions::keep_thin), as in mesh_scene_smoothly. Instances are not
@@ -62,7 +80,7 @@ struct ChunkSurface {
   std::shared_ptr<const void> converted;
   std::size_t converted_bytes = 0;  ///< ConvertedSurface::bytes; 0: unknown
 
-  [[nodiscard]] bool is_empty() const { return quads.empty() && smooth.indices.empty(); }
+  [[nodiscard]] bool is_empty() const { return quads.empty() && smooth.indices.empty() && shapes.empty(); }
   [[nodiscard]] std::int64_t triangles() const;
   [[nodiscard]] std::size_t bytes() const;  ///< excludes `converted`
   /// Returns the size of the data that a renderer uploads: `converted_bytes` if known, otherwise `bytes`.
@@ -94,7 +112,8 @@ struct MaterialWeight {
 /// Space:    positions are relative to the chunk: its first voxel or sample is (0, 0, 0). -64 to 127 on each axis reach
 ///           the 26 neighbours.
 /// Followed: a chunk is meshed again if a voxel of it, or one of their 26 neighbours, changes its type or light, or its
-///           data if the type has VoxelProperties::remesh_on_data. Smooth surfaces and fields: if the densities or
+///           data if the type has VoxelProperties::remesh_on_data; with types that have shapes, voxels and their states
+///           up to kShapeReach away, and light up to 3 voxels away. Smooth surfaces and fields: if the densities or
 ///           materials that its mesh reads change. Content farther away can differ from the neighbours' surfaces.
 /// Lifetime: valid only during the call that receives it, with all pointers in it. Do not keep copies.
 /// Threads:  only the thread that receives it.

@@ -74,6 +74,10 @@ class SurfaceLight {
   /// Writes the light of vertices, or of any positions at a surface. Sample (i, j, k) is the centre of voxel (i, j, k).
   /// Requires: as many unit normals as positions; `out` has at least as many elements.
   void read(const SmoothSamples& samples, std::span<MeanLevels> out);
+  /// Replaces `corners` with the light at the corners of faces of shapes, in the order of ModelFace::corners: that of
+  /// `read`, rounded to twelfths of a level. `chunk`: the chunk of the faces.
+  /// Reads: voxels up to 3 away from a face's own; up to 2 if its shape stays within its voxel.
+  void read(std::span<const ShapeFace> faces, IVec3 chunk, BlockVector<FaceLight>& corners);
 
  private:
   struct [[gnu::visibility("hidden")]] Rows;

@@ -19,6 +19,8 @@
 
 #include <quoin/grid/voxel_shape.h>
 
+#include "core/rows/packed_row.h"
+
 namespace quoin {
 namespace {
 
@@ -165,6 +167,29 @@ void find_occluders(ModelFace& face) {
   }
 }
 
+// Returns a hash of the faces of a model and their looks.
+std::uint64_t hash_of(const ShapeModel& model) {
+  std::uint64_t hash = kHashSeed;
+  const auto mix = [&](std::uint64_t word) { hash = mixed_with(hash, word); };
+  const auto mix_floats = [&](float a, float b) {
+    mix(std::uint64_t{std::bit_cast<std::uint32_t>(a)} << 32 | std::bit_cast<std::uint32_t>(b));
+  };
+  for (const ModelFace& face : model.faces) {
+    mix(std::uint64_t{face.look} << 8 | static_cast<std::uint64_t>(face.direction));
+    for (std::size_t i = 0; i < 4; ++i) {
+      mix_floats(face.corners[i].x, face.corners[i].y);
+      mix_floats(face.corners[i].z, face.uv[i][0]);
+      mix_floats(face.uv[i][1], face.normal[static_cast<int>(i % 3)]);
+    }
+  }
+  for (const VoxelFace& look : model.looks) {
+    mix(look.texture.is_null() ? 0 : look.texture.hash());
+    mix(std::uint64_t{look.turn} << 40 | std::uint64_t{look.mirrored} << 48 |
+        static_cast<std::uint64_t>(look.alpha) << 56 | std::uint64_t{std::bit_cast<std::uint32_t>(look.tint)});
+  }
+  return hash;
+}
+
 class ModelBuilder {
  public:
   void add(const ShapeElement& element, const AxisOrientation& orientation) {
@@ -272,6 +297,7 @@ class ModelBuilder {
       m.covers_side[i] = std::all_of(m.sides[i].begin(), m.sides[i].end(),
                                      [](std::uint64_t word) { return word == ~std::uint64_t{0}; });
     }
+    m.hash = hash_of(m);
     if (is_bounded_) {
       for (int axis = 0; axis < 3; ++axis) {
         m.cells.min[axis] = std::min(0, static_cast<int>(std::floor(m.min[axis])));

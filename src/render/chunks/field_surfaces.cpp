@@ -95,7 +95,7 @@ int level_for(double distance, int present, double step) {
 FieldSurfaces::FieldSurfaces(GridHandle handle, const ChunkSurfaceOptions& options, SurfaceTotals& totals)
     : handle_(handle), options_(options), totals_(totals) {}
 
-void FieldSurfaces::follow(const SceneGrid& content, SurfaceClock::time_point now) {
+void FieldSurfaces::follow(const SceneGrid& content, const VoxelRegistry& /*types*/, SurfaceClock::time_point now) {
   has_left_ = false;
   PendingChanges changes(followed_, content.field);
   if (changes->empty()) return;

@@ -21,7 +21,7 @@ class FieldSurfaces final : public SurfaceSource {
  public:
   FieldSurfaces(GridHandle handle, const ChunkSurfaceOptions& options, SurfaceTotals& totals);
 
-  void follow(const SceneGrid& content, SurfaceClock::time_point now) override;
+  void follow(const SceneGrid& content, const VoxelRegistry& types, SurfaceClock::time_point now) override;
   void leave() override;
   void forget() override;
   void discard() override;

@@ -48,7 +48,19 @@ void mix_into(std::array<std::uint64_t, 4>& lanes, std::span<const FaceLight> li
   }
 }
 
-std::uint64_t hash_of(const SurfaceRegion& region, const ChunkSurface& surface) {
+void mix_into(std::array<std::uint64_t, 4>& lanes, std::span<const ShapeFace> faces) {
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    const ShapeFace& face = faces[i];
+    std::uint64_t& model = lanes[i % 2];
+    std::uint64_t& place = lanes[2 + i % 2];
+    model = mixed_with(model, face.model->hash);
+    place = mixed_with(place, std::uint64_t{face.bits} << 32 | std::uint64_t{face.face} << 16 | face.type);
+  }
+}
+
+// Returns the hash of a region, by its index in the surface.
+std::uint64_t hash_of(std::size_t index, const ChunkSurface& surface) {
+  const SurfaceRegion& region = surface.regions[index];
   const std::span<const Quad> quads(surface.quads.begin(), surface.quads.size());
   const std::span<const FaceLight> light(surface.light);
   std::array<std::uint64_t, 4> lanes = {1, 2, 3, 4};
@@ -58,6 +70,16 @@ std::uint64_t hash_of(const SurfaceRegion& region, const ChunkSurface& surface) 
     lanes[0] = mixed_with(lanes[0], count);
     mix_into(lanes, quads.subspan(range[0], count));
     if (!light.empty()) mix_into(lanes, light.subspan(range[0], count));
+  }
+  if (!surface.shapes.empty()) {
+    const RegionShapes& shapes = surface.region_shapes[index];
+    for (const auto& [first, end] : {shapes.opaque, shapes.transparent}) {
+      QUOIN_ASSERT(first <= end && end <= surface.shapes.size(), "faces of the surface");
+      const std::uint32_t count = end - first;
+      lanes[0] = mixed_with(lanes[0], count);
+      mix_into(lanes, std::span(surface.shapes).subspan(first, count));
+      if (!surface.shape_light.empty()) mix_into(lanes, std::span(surface.shape_light).subspan(first, count));
+    }
   }
   std::uint64_t hash = kHashSeed;
   for (const std::uint64_t lane : lanes) hash = mixed_with(hash, lane);
@@ -78,14 +100,89 @@ std::array<std::uint32_t, 7> directions_of(const QuadBuffer& quads, std::size_t 
   return range;
 }
 
-// Quads, with their light if any.
-struct LitQuads {
+// The quads of a chunk and the faces of its shapes, with their light if any.
+struct LitFaces {
   const QuadBuffer& quads;
   std::span<const FaceLight> light;
+  const ShapeFaceBuffer& shapes;
+  std::span<const FaceLight> shape_light;
 };
 
+// Returns the number of a voxel's region.
+std::size_t region_of(IVec3 voxel, int edge) {
+  const int across = kChunkEdge / edge;
+  const IVec3 at = voxel / edge;
+  return static_cast<std::size_t>(at.x + across * (at.y + across * at.z));
+}
+
+std::size_t region_count(int edge) {
+  const auto across = static_cast<std::size_t>(kChunkEdge / edge);
+  return across * across * across;
+}
+
+// The places of faces of shapes in a surface: those of opaque material by region, then the others by region.
+class ShapePlaces {
+ public:
+  // Takes memory only if there are faces.
+  ShapePlaces(const ShapeFaceBuffer& faces, const VoxelRegistry& types, int edge)
+      : types_(types), edge_(edge), regions_(region_count(edge)) {
+    if (faces.empty()) return;
+    first_.resize(2 * regions_ + 1);
+    for (const ShapeFace& face : faces) ++first_[place_of(face) + 1];
+    for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
+  }
+
+  [[nodiscard]] bool empty() const { return first_.empty(); }
+  [[nodiscard]] std::uint32_t opaque_count() const { return first_[regions_]; }
+  // Requires: not empty.
+  [[nodiscard]] RegionShapes of(std::size_t region) const {
+    const std::size_t transparent = regions_ + region;
+    return {{first_[region], first_[region + 1]}, {first_[transparent], first_[transparent + 1]}};
+  }
+  [[nodiscard]] bool has_any(std::size_t region) const {
+    if (empty()) return false;
+    const RegionShapes shapes = of(region);
+    return shapes.opaque[0] != shapes.opaque[1] || shapes.transparent[0] != shapes.transparent[1];
+  }
+  // Returns the place of the next face. Call it once for each face, in order, and `of` no more.
+  [[nodiscard]] std::uint32_t take(const ShapeFace& face) { return first_[place_of(face)]++; }
+
+ private:
+  [[nodiscard]] std::size_t place_of(const ShapeFace& face) const {
+    const bool is_transparent = types_[face.type].visibility == Visibility::Transparent;
+    return (is_transparent ? regions_ : 0) + region_of(face.voxel(), edge_);
+  }
+
+  const VoxelRegistry& types_;
+  int edge_;
+  std::size_t regions_;
+  std::vector<std::uint32_t> first_;  // and the end of all
+};
+
+// Sets all parts of the surface that belong to shapes. Requires: its regions are set.
+void put_shapes(const LitFaces& lit, const VoxelRegistry& types, int edge, ShapePlaces& places, ChunkSurface& surface) {
+  if (places.empty()) return;
+  surface.opaque_shapes = places.opaque_count();
+  surface.region_shapes.reserve(surface.regions.size());
+  for (const SurfaceRegion& region : surface.regions) {
+    surface.region_shapes.push_back(places.of(region_of(region.region * edge, edge)));
+  }
+  surface.shapes.resize(lit.shapes.size());
+  surface.shape_light.resize(lit.shape_light.size());
+  std::vector<bool> is_kept(types.size());
+  for (std::size_t i = 0; i < lit.shapes.size(); ++i) {
+    const ShapeFace& face = lit.shapes[i];
+    const std::uint32_t place = places.take(face);
+    surface.shapes[place] = face;
+    if (!lit.shape_light.empty()) surface.shape_light[place] = lit.shape_light[i];
+    if (is_kept[face.type]) continue;
+    is_kept[face.type] = true;
+    surface.shapes_of_types.push_back(types[face.type].shapes);
+  }
+}
+
 // Sorts the quads, opaque types first.
-void sort_into_one(const LitQuads& lit, const VoxelRegistry& types, ChunkSurface& surface) {
+void sort_into_one(const LitFaces& lit, const VoxelRegistry& types, ChunkSurface& surface) {
   const QuadBuffer& quads = lit.quads;
   surface.quads.resize(quads.size());
   surface.light.resize(lit.light.size());
@@ -116,17 +213,14 @@ void sort_into_one(const LitQuads& lit, const VoxelRegistry& types, ChunkSurface
       {IVec3{0}, directions_of(surface.quads, 0, opaque), directions_of(surface.quads, opaque, quads.size()), 0});
 }
 
-void sort_into_many(const LitQuads& lit, const VoxelRegistry& types, int edge, ChunkSurface& surface) {
+void sort_into_many(const LitFaces& lit, const VoxelRegistry& types, int edge, const ShapePlaces& shapes,
+                    ChunkSurface& surface) {
   const QuadBuffer& quads = lit.quads;
   const int across = kChunkEdge / edge;
-  const auto region_of = [&](IVec3 voxel) {
-    const IVec3 at = voxel / edge;
-    return static_cast<std::size_t>(at.x + across * (at.y + across * at.z));
-  };
-  const auto regions = static_cast<std::size_t>(across * across * across);
+  const std::size_t regions = region_count(edge);
   const auto place_of = [&](Quad quad) {
     const std::size_t which = types.is_transparent(quad.type()) ? regions : 0;
-    return 6 * (which + region_of(quad.voxel())) + static_cast<std::size_t>(quad.direction());
+    return 6 * (which + region_of(quad.voxel(), edge)) + static_cast<std::size_t>(quad.direction());
   };
   std::vector<std::uint32_t> first(12 * regions + 1);
   for (const Quad quad : quads) ++first[place_of(quad) + 1];
@@ -135,7 +229,7 @@ void sort_into_many(const LitQuads& lit, const VoxelRegistry& types, int edge, C
   for (std::size_t i = 0; i < regions; ++i) {
     const auto opaque = first.begin() + static_cast<std::ptrdiff_t>(6 * i);
     const auto transparent = opaque + static_cast<std::ptrdiff_t>(6 * regions);
-    if (opaque[0] == opaque[6] && transparent[0] == transparent[6]) continue;
+    if (opaque[0] == opaque[6] && transparent[0] == transparent[6] && !shapes.has_any(i)) continue;
     const auto number = static_cast<int>(i);
     SurfaceRegion region{{number % across, number / across % across, number / across / across}, {}, {}};
     std::copy_n(opaque, 7, region.opaque.begin());
@@ -152,19 +246,23 @@ void sort_into_many(const LitQuads& lit, const VoxelRegistry& types, int edge, C
   }
 }
 
-// Returns the quads in the order of ChunkSurface.
-void sort_into_regions(const LitQuads& lit, const VoxelRegistry& types, int edge, ChunkSurface& surface) {
+// Sets the faces of the surface, in the order of ChunkSurface.
+void sort_into_regions(const LitFaces& lit, const VoxelRegistry& types, int edge, ChunkSurface& surface) {
   QUOIN_ASSERT(lit.light.empty() || lit.light.size() == lit.quads.size(), "the light of each quad, or none");
+  QUOIN_ASSERT(lit.shape_light.empty() || lit.shape_light.size() == lit.shapes.size(),
+               "the light of each face of shapes, or none");
+  ShapePlaces shapes(lit.shapes, types, edge);
   if (edge == kChunkEdge) {
     sort_into_one(lit, types, surface);
   } else {
-    sort_into_many(lit, types, edge, surface);
+    sort_into_many(lit, types, edge, shapes, surface);
   }
-  for (SurfaceRegion& region : surface.regions) region.hash = hash_of(region, surface);
+  put_shapes(lit, types, edge, shapes, surface);
+  for (std::size_t i = 0; i < surface.regions.size(); ++i) surface.regions[i].hash = hash_of(i, surface);
 }
 
-// Splits quads whose faces differ in light.
-LitQuads lit_by(const SurfaceJob& job, const QuadBuffer& quads, LightMerging merging, SurfaceWorkspace& workspace) {
+// Splits quads whose faces differ in light, and lights the faces of shapes in the workspace.
+LitFaces lit_by(const SurfaceJob& job, const QuadBuffer& quads, LightMerging merging, SurfaceWorkspace& workspace) {
   QUOIN_ASSERT(job.light != nullptr && job.types != nullptr, "a job with light and types");
   if (workspace.lit != job.light || workspace.lit_types != job.types) {
     workspace.surface_light.reset();
@@ -173,7 +271,8 @@ LitQuads lit_by(const SurfaceJob& job, const QuadBuffer& quads, LightMerging mer
     workspace.surface_light.emplace(job.light->light, job.light->voxels, *job.types);
   }
   workspace.surface_light->split(quads, job.chunk, merging, workspace.lit_quads, workspace.face_light);
-  return {workspace.lit_quads, workspace.face_light};
+  workspace.surface_light->read(workspace.shapes, job.chunk, workspace.shape_light);
+  return {workspace.lit_quads, workspace.face_light, workspace.shapes, workspace.shape_light};
 }
 
 // Splits quads that cross the border of a region. Merged faces are all alike, so the parts have the same faces.
@@ -194,17 +293,18 @@ void make_blocky(const ChunkSurfaceOptions& options, SurfaceJob& job, SurfaceWor
   if (!workspace.blocky) workspace.blocky.emplace();
   QuadOptions wanted;
   wanted.merge = options.merge;
-  wanted.shapes = ShapeUse::Cubes;  // a surface has no place for shapes yet
+  wanted.shapes = options.shapes;
   const VoxelRegistry& types = *job.types;
-  workspace.blocky->mesh(job.voxels->neighbourhood(job.chunk), types, wanted, workspace.quads);
-  if (workspace.quads.empty()) return;
+  workspace.blocky->mesh(job.voxels->neighbourhood(job.chunk), types, wanted, workspace.quads, workspace.shapes);
+  if (workspace.quads.empty() && workspace.shapes.empty()) return;
   auto surface = std::make_shared<ChunkSurface>();
   surface->style = SurfaceStyle::Blocky;
   const bool is_cut = options.region_edge < kChunkEdge;
   if (is_cut) cut_at_regions(workspace.quads, options.region_edge, workspace.cut_quads);
   const QuadBuffer& quads = is_cut ? workspace.cut_quads : workspace.quads;
   const bool is_lit = job.light != nullptr;
-  const LitQuads lit = is_lit ? lit_by(job, quads, options.light_merging, workspace) : LitQuads{quads, {}};
+  const LitFaces lit =
+      is_lit ? lit_by(job, quads, options.light_merging, workspace) : LitFaces{quads, {}, workspace.shapes, {}};
   sort_into_regions(lit, types, options.region_edge, *surface);
   job.surface = std::move(surface);
 }
@@ -450,7 +550,9 @@ void SurfaceContext::material_weights(const ChunkSurface& surface, std::size_t v
 }
 
 std::int64_t ChunkSurface::triangles() const {
-  return 2 * static_cast<std::int64_t>(quads.size()) + static_cast<std::int64_t>(smooth.indices.size() / 3);
+  const auto single = std::ranges::count_if(shapes, [](const ShapeFace& face) { return face.is_triangle(); });
+  return 2 * static_cast<std::int64_t>(quads.size() + shapes.size()) - static_cast<std::int64_t>(single) +
+         static_cast<std::int64_t>(smooth.indices.size() / 3);
 }
 
 std::size_t ChunkSurface::bytes() const {
@@ -458,7 +560,9 @@ std::size_t ChunkSurface::bytes() const {
          smooth.normals.capacity() * sizeof(Vec3) + smooth.occlusion.capacity() * sizeof(float) +
          smooth.cells.capacity() * sizeof(SmoothCell) + smooth.indices.capacity() * sizeof(std::uint32_t) +
          albedo.capacity() * sizeof(LinearRgba16) + types.capacity() * sizeof(VoxelType) +
-         regions.capacity() * sizeof(SurfaceRegion) + light.capacity() * sizeof(FaceLight);
+         regions.capacity() * sizeof(SurfaceRegion) + light.capacity() * sizeof(FaceLight) +
+         shapes.capacity() * sizeof(ShapeFace) + shape_light.capacity() * sizeof(FaceLight) +
+         region_shapes.capacity() * sizeof(RegionShapes) + shapes_of_types.capacity() * sizeof(VoxelShapes);
 }
 
 }  // namespace quoin

@@ -26,6 +26,7 @@ namespace quoin {
 struct ChunkSurfaceOptions {
   SurfaceStyle style = SurfaceStyle::Blocky;
   bool merge = true;
+  ShapeUse shapes = ShapeUse::Faces;
   int region_edge = 64;
   LightMerging light_merging = LightMerging::Linear;
   SmoothOcclusionOptions occlusion{};
@@ -97,7 +98,9 @@ struct SurfaceWorkspace {
   QuadBuffer cut_quads;
   QuadBuffer lit_quads;
   BlockVector<FaceLight> face_light;  // of `lit_quads`
-  LightSnapshot lit;                  // with the types
+  ShapeFaceBuffer shapes;
+  BlockVector<FaceLight> shape_light;  // of `shapes`
+  LightSnapshot lit;                   // with the types
   std::shared_ptr<const VoxelRegistry> lit_types;
   std::optional<SurfaceLight> surface_light;  // of both; it remembers rows from chunk to chunk
   SmoothChunkMesh mesh;

@@ -66,12 +66,13 @@ std::unique_ptr<SurfaceSource> make_surface_source(SurfaceKey key, const ChunkSu
 }
 
 GridSurfaces::GridSurfaces(GridHandle handle, SurfaceContent content, SurfaceStyle style)
-    : options_{.style = style}, source_(make_surface_source({handle, content}, options_, totals_)) {
+    : options_{.style = style, .shapes = ShapeUse::Cubes},
+      source_(make_surface_source({handle, content}, options_, totals_)) {
   totals_.loads_only = true;  // `update` returns all surfaces together
 }
 
 std::vector<SurfaceUpdate> GridSurfaces::update(const SceneGrid& grid, const VoxelRegistry& types, Threads threads) {
-  source_->follow(grid, SurfaceClock::now());
+  source_->follow(grid, types, SurfaceClock::now());
   SurfaceTypes looks;
   looks.registry = std::shared_ptr<const VoxelRegistry>(std::shared_ptr<void>(), &types);
   // Connected chunks of a field are meshed as one group; chunks that waited for the group may follow.

@@ -176,14 +176,15 @@ class SurfaceSource {
   virtual ~SurfaceSource() = default;
 
   /// Takes over the edits. Cost: proportional to the edits.
-  virtual void follow(const SceneGrid& content, SurfaceClock::time_point now) = 0;
+  virtual void follow(const SceneGrid& content, const VoxelRegistry& types, SurfaceClock::time_point now) = 0;
   /// Takes over the changes of its light. The pointers of `light` are null if no light is used.
-  virtual void follow_light(const GridLight& light, SurfaceClock::time_point now) {
+  virtual void follow_light(const GridLight& light, const VoxelRegistry& types, SurfaceClock::time_point now) {
     (void)light;
+    (void)types;
     (void)now;
   }
   /// Takes over the changes of voxel data: marks the chunks that contain or touch a changed voxel of a type with
-  /// VoxelProperties::remesh_on_data. Call after `follow`.
+  /// VoxelProperties::remesh_on_data, or have one with shapes within kShapeReach. Call after `follow`.
   virtual void follow_data(const SceneGrid& content, const VoxelRegistry& types, SurfaceClock::time_point now) {
     (void)content;
     (void)types;
@@ -258,7 +259,7 @@ class SurfaceSource {
                                                                  SurfaceTotals& totals);
 
 /// The surfaces of the chunks of one grid's voxels or field, made on request instead of by workers. Equal to those of
-/// LiveMeshes with a `region_edge` of 64; after an edit, only the affected ones are made.
+/// LiveMeshes with a `region_edge` of 64 and ShapeUse::Cubes; after an edit, only the affected ones are made.
 class GridSurfaces {
  public:
   GridSurfaces(GridHandle handle, SurfaceContent content, SurfaceStyle style);

@@ -20,8 +20,11 @@ bool has_solid_first_layer(const Chunk* chunk, std::size_t axis) {
   return ChunkStorage::of(*chunk)->layer_counts[axis][0] != 0;
 }
 
-// The voxels of a chunk that touch no other chunk.
-constexpr IBox kInnerVoxels{IVec3(1), IVec3(kChunkEdge - 1)};
+// The voxels of a chunk whose data no surface of another chunk reads.
+constexpr IBox kInnerVoxels{IVec3(kShapeReach), IVec3(kChunkEdge - kShapeReach)};
+
+// Distance in voxels up to which light changes that of a shape's face: see SurfaceLight::read.
+constexpr int kShapeLightReach = 3;
 
 // Partial grids: the densities of a chunk depend on the chunk and its 26 neighbours.
 constexpr int kSmoothDistance = 2;
@@ -39,7 +42,8 @@ bool can_own_smooth_quads(const Grid& grid, IVec3 chunk) {
 VoxelSurfaces::VoxelSurfaces(GridHandle handle, const ChunkSurfaceOptions& options, SurfaceTotals& totals)
     : handle_(handle), options_(options), totals_(totals), densities_(reach_of(options.occlusion), totals.releases) {}
 
-void VoxelSurfaces::follow(const Grid& grid, SurfaceClock::time_point now) {
+void VoxelSurfaces::follow(const SceneGrid& content, const VoxelRegistry& types, SurfaceClock::time_point now) {
+  const Grid& grid = content.grid;
   PendingChanges changes(followed_, grid);
   if (changes->empty()) return;
   const bool is_load =
@@ -47,7 +51,7 @@ void VoxelSurfaces::follow(const Grid& grid, SurfaceClock::time_point now) {
   const Cause cause = is_load ? Cause::Load : Cause::Edit;
   if (changes->all) begin_anew(cause);
   if (options_.style == SurfaceStyle::Blocky) {
-    follow_blocky(grid, *changes, cause, now);
+    follow_blocky(grid, types, *changes, cause, now);
   } else {
     follow_smooth(grid, *changes, cause, now);
   }
@@ -56,7 +60,7 @@ void VoxelSurfaces::follow(const Grid& grid, SurfaceClock::time_point now) {
 
 // Corners of faces have the light of voxels in front of them: chunks that hold one of the 26 neighbours of a voxel
 // whose light changed are meshed again.
-void VoxelSurfaces::follow_light(const GridLight& light, SurfaceClock::time_point now) {
+void VoxelSurfaces::follow_light(const GridLight& light, const VoxelRegistry& types, SurfaceClock::time_point now) {
   if (options_.style != SurfaceStyle::Blocky) return;
   if (light.light == nullptr) {
     if (std::exchange(is_lit_, false)) mark_all(now);
@@ -72,6 +76,13 @@ void VoxelSurfaces::follow_light(const GridLight& light, SurfaceClock::time_poin
       if (change.affects(offset)) mark_for_look(change.chunk + offset, now);
     }
   }
+  if (has_shapes(types)) {
+    std::vector<IVec3> near;
+    for (const ChunkChange& change : changes->items_unless_all()) {
+      add_chunks_near(change.chunk, change.box, kShapeLightReach, near);
+    }
+    for (const IVec3 chunk : near) mark_for_look(chunk, now);
+  }
   changes.commit();
 }
 
@@ -80,10 +91,10 @@ void VoxelSurfaces::mark_data(const Grid& grid, const DataChanges& changes, cons
   ChunkSet reached;
   visit_data_changes(*followed_voxels_, grid, changes, [&](IVec3 voxel, const VoxelData&, const VoxelData&) {
     if (!types.remeshes_on_data(grid.get(voxel))) return;
-    const IVec3 local = local_of(voxel);
     reached.insert(chunk_of(voxel));
-    if (kInnerVoxels.contains(local)) return;
-    for (int i = 0; i < 27; ++i) reached.insert(chunk_of(voxel + Neighbourhood::offset(i)));
+    if (kInnerVoxels.contains(local_of(voxel))) return;
+    const int reach = has_shapes(types) && types.is_shaped(grid.get(voxel)) ? kShapeReach : 1;
+    for (int i = 0; i < 27; ++i) reached.insert(chunk_of(voxel + reach * Neighbourhood::offset(i)));
   });
   for (const IVec3 chunk : reached) {
     mark_for_look(chunk, now);
@@ -170,7 +181,7 @@ void VoxelSurfaces::discard() {
   }
 }
 
-void VoxelSurfaces::follow_blocky(const Grid& grid, const GridChanges& changes, Cause cause,
+void VoxelSurfaces::follow_blocky(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes, Cause cause,
                                   SurfaceClock::time_point now) {
   const auto see = [&](const std::vector<IVec3>& chunks, Cause why) {
     for (const IVec3 chunk : chunks) {
@@ -188,11 +199,19 @@ void VoxelSurfaces::follow_blocky(const Grid& grid, const GridChanges& changes, 
   }
   std::vector<ChunkChange> edits;
   std::vector<ChunkChange> loads;
+  std::vector<IVec3> near_edits;
+  std::vector<IVec3> near_loads;
   for (const ChunkChange& change : changes.items_unless_all()) {
-    (change.is_edit && cause == Cause::Edit ? edits : loads).push_back(change);
+    const bool is_edit = change.is_edit && cause == Cause::Edit;
+    (is_edit ? edits : loads).push_back(change);
+    if (!has_shapes(types)) continue;
+    add_chunks_near(change.chunk, change.box, is_lit_ ? kShapeLightReach : kShapeReach,
+                    is_edit ? near_edits : near_loads);
   }
   see(chunks_to_mesh(grid, GridChanges(std::move(edits))), Cause::Edit);
   see(chunks_to_mesh(grid, GridChanges(std::move(loads))), Cause::Load);
+  for (const IVec3 chunk : near_edits) mark_if_there(chunk, Cause::Edit, now);
+  for (const IVec3 chunk : near_loads) mark_if_there(chunk, Cause::Load, now);
 }
 
 // Adds chunks that may have waited for a chunk to load, or must be hidden without it.

@@ -51,9 +51,8 @@ class VoxelSurfaces final : public SurfaceSource {
  public:
   VoxelSurfaces(GridHandle handle, const ChunkSurfaceOptions& options, SurfaceTotals& totals);
 
-  void follow(const SceneGrid& content, SurfaceClock::time_point now) override { follow(content.grid, now); }
-  void follow(const Grid& grid, SurfaceClock::time_point now);
-  void follow_light(const GridLight& light, SurfaceClock::time_point now) override;
+  void follow(const SceneGrid& content, const VoxelRegistry& types, SurfaceClock::time_point now) override;
+  void follow_light(const GridLight& light, const VoxelRegistry& types, SurfaceClock::time_point now) override;
   void follow_data(const SceneGrid& content, const VoxelRegistry& types, SurfaceClock::time_point now) override;
   void leave() override;
   void forget() override;
@@ -94,7 +93,8 @@ class VoxelSurfaces final : public SurfaceSource {
   };
 
   void begin_anew(Cause cause);
-  void follow_blocky(const Grid& grid, const GridChanges& changes, Cause cause, SurfaceClock::time_point now);
+  void follow_blocky(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes, Cause cause,
+                     SurfaceClock::time_point now);
   void follow_smooth(const Grid& grid, const GridChanges& changes, Cause cause, SurfaceClock::time_point now);
   void mark_data(const Grid& grid, const DataChanges& changes, const VoxelRegistry& types,
                  SurfaceClock::time_point now);
@@ -118,6 +118,10 @@ class VoxelSurfaces final : public SurfaceSource {
   [[nodiscard]] std::size_t region_count() const {
     const auto across = static_cast<std::size_t>(kChunkEdge / options_.region_edge);
     return across * across * across;
+  }
+  // Returns true if surfaces may have shapes: they then depend on voxels farther away.
+  [[nodiscard]] bool has_shapes(const VoxelRegistry& types) const {
+    return types.has_shapes() && options_.style == SurfaceStyle::Blocky && options_.shapes == ShapeUse::Faces;
   }
   [[nodiscard]] bool has_regions() const { return options_.style == SurfaceStyle::Blocky && region_count() > 1; }
 

@@ -61,7 +61,8 @@ class VertexLights {
       if (is_of_shape(view, vertex)) {
         const Vec3 normal = normal_at(view, vertex);
         std::array<MeanLevels, 1> mean;
-        surface.read({{&view.positions[vertex], 1}, {&normal, 1}}, mean);
+        const Vec3 sample = view.positions[vertex] - 0.5F;  // samples are at the centres of voxels
+        surface.read({{&sample, 1}, {&normal, 1}}, mean);
         out[i] = stored(mean[0], normal, emission_of(view.types[vertex]));
         continue;
       }

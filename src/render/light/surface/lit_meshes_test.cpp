@@ -107,6 +107,41 @@ TEST_F(LitMeshes, SmoothVerticesTakeLightInFront) {
   EXPECT_GT(lit, 1000U);
 }
 
+// A full box has the light of the cube in its place.
+TEST_F(LitMeshes, LightsShapesLikeCubes) {
+  LightWorld world(6);
+  const VoxelType box = world.types
+                            .add({.name = "box",
+                                  .visibility = Visibility::Transparent,
+                                  .shapes = VoxelShape::box(IVec3(0), IVec3(kShapeUnits))})
+                            .value();
+  world.grid.fill_box({{-8, 12, -8}, {8, 13, 8}}, LightWorld::kStone);
+  world.grid.set({-4, 14, 3}, LightWorld::kLamp);
+  for (const IVec3 at : {IVec3{0, 14, 0}, {-6, 15, 5}, {5, 13, -5}}) world.grid.set(at, box);
+  put(std::move(world));
+  auto meshes = mesh_lit_scene(scene_, options_);
+  ASSERT_TRUE(meshes);
+  SurfaceLight surface(light_, grid(), scene_.types);
+  int vertices = 0;
+  for (const MeshView& view : meshes->parts[0].surfaces) {
+    for (std::size_t i = 0; i < view.positions.size() && !view.looks.empty(); ++i) {
+      if (!view.looks[i].is_shape) continue;
+      const Direction direction = view.directions[i];
+      const FaceFrame& frame = frame_of(direction);
+      const Vec3 inside =
+          (view.positions[i - i % 4] + view.positions[i - i % 4 + 2]) * 0.5F - Vec3(normal_of(direction)) * 0.5F;
+      const IVec3 voxel = voxel_of(DVec3(inside));
+      const bool is_far_u = view.positions[i][frame.u] > inside[frame.u];
+      const bool is_far_v = view.positions[i][frame.v] > inside[frame.v];
+      const std::size_t corner = is_far_v ? (is_far_u ? 2 : 3) : (is_far_u ? 1 : 0);
+      const MeanLevels levels = levels_of_corner(surface.face(voxel, direction)[corner]);
+      expect_light(view.light[i], wanted(levels, Vec3(normal_of(direction)), 0.0F), 1.01F);
+      ++vertices;
+    }
+  }
+  EXPECT_EQ(vertices, 3 * 24 - 4);  // the floor hides a side
+}
+
 TEST_F(LitMeshes, LightsFieldsBySamples) {
   LightWorld empty;
   scene_.types = empty.types;

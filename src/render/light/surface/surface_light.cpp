@@ -2,6 +2,8 @@
 #include <quoin/render/surface_light.h>
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 
 #include <quoin/core/assert.h>
 
@@ -27,6 +29,78 @@ SurfaceLight::~SurfaceLight() = default;
 
 FaceLight SurfaceLight::face(IVec3 voxel, Direction direction) {
   return face_light(impl_of(rows_).voxels, voxel + normal_of(direction), direction);
+}
+
+namespace {
+
+// Returns the light of a voxel if light passes it, and all of its 26 neighbours that light passes have the same.
+std::optional<std::uint16_t> even_light_around(LightRows& voxels, IVec3 voxel) {
+  if (!voxels.passes(voxel)) return std::nullopt;
+  const std::uint16_t word = voxels.word(voxel);
+  for (int i = 0; i < 9; ++i) {
+    const IVec3 first = voxel + IVec3(-1, i % 3 - 1, i / 3 - 1);
+    for (int x = 0; x < 3;) {
+      const LightRows::Row& row = voxels.row_of(first + IVec3(x, 0, 0));
+      auto at = static_cast<std::size_t>((first.x + x) & (kChunkEdge - 1));
+      for (; x < 3 && at < kChunkEdge; ++x, ++at) {
+        if ((row.passing >> at & 1U) != 0 && row.words[at] != word) return std::nullopt;
+      }
+    }
+  }
+  return word;
+}
+
+// Returns the light of a face's corner: half a voxel in front of it.
+class ShapeCorners {
+ public:
+  ShapeCorners(LightRows& voxels, IVec3 voxel, const ShapeModel& model) : voxels_(voxels), voxel_(voxel) {
+    if (model.cells == IBox{IVec3(0), IVec3(1)}) even_ = even_light_around(voxels, voxel);
+  }
+
+  [[nodiscard]] std::uint32_t light(const Vec3& corner, const Vec3& normal) const {
+    if (even_ && reads_even(corner, normal)) return 12 * level_bytes(*even_);
+    // Samples are at the centres of voxels.
+    const DVec3 point = DVec3(voxel_) - 0.5 + DVec3(corner);
+    const MeanLevels levels = light_before(voxels_, point, normal, 1);
+    const auto part = [](float level) { return static_cast<std::uint32_t>(std::lround(12.0F * level)); };
+    return part(levels.sky) | part(levels.red) << 8 | part(levels.green) << 16 | part(levels.blue) << 24;
+  }
+
+ private:
+  // Returns true if the light in front is that of the voxel and its neighbours: some of them count, and no other voxel.
+  [[nodiscard]] bool reads_even(const Vec3& corner, const Vec3& normal) const {
+    for (int axis = 0; axis < 3; ++axis) {
+      const float at = corner[axis] - 0.5F + 0.5F * normal[axis];
+      if (at < -1.0F || at > 1.0F) return false;
+      if (at < 1.0F) continue;
+      // The voxel itself is none of the eight around the point: the next one is the nearest.
+      IVec3 next = voxel_;
+      ++next[axis];
+      if (!voxels_.passes(next)) return false;
+    }
+    return true;
+  }
+
+  LightRows& voxels_;
+  IVec3 voxel_;
+  std::optional<std::uint16_t> even_;
+};
+
+}  // namespace
+
+void SurfaceLight::read(std::span<const ShapeFace> faces, IVec3 chunk, BlockVector<FaceLight>& corners) {
+  corners.clear();
+  corners.reserve(faces.size());
+  LightRows& voxels = impl_of(rows_).voxels;
+  for (std::size_t first = 0, end = 0; first < faces.size(); first = end) {
+    const IVec3 local = faces[first].voxel();
+    const ShapeCorners light(voxels, chunk * kChunkEdge + local, *faces[first].model);
+    for (end = first; end < faces.size() && faces[end].voxel() == local; ++end) {
+      const ModelFace& face = faces[end].model_face();
+      FaceLight& of_face = corners.emplace_back();
+      for (std::size_t i = 0; i < of_face.size(); ++i) of_face[i] = light.light(face.corners[i], face.normal);
+    }
+  }
 }
 
 namespace {
