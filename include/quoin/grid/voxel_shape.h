@@ -28,8 +28,8 @@ inline constexpr int kMaxShapeUnit = 32;
 inline constexpr std::size_t kMaxShapeElements = 128;
 /// Maximum number of parts of a type's shapes (ShapeRules::parts).
 inline constexpr std::size_t kMaxShapeParts = 64;
-/// Distance, in voxels on each axis, up to which a change of a voxel or its state changes faces of shapes, and faces of
-/// cubes next to shapes: a shape follows its neighbours, and covers and darkens theirs.
+/// Reach of a change with shapes: the type or state of a voxel affects faces of shapes, and of cubes next to shapes, at
+/// most this many voxels away on each axis. A shape follows its neighbours, and covers and darkens theirs.
 inline constexpr int kShapeReach = 2;
 
 /// One side of an element.

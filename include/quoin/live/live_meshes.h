@@ -34,8 +34,8 @@ struct ConvertedSurface {
 };
 
 /// A function that converts surfaces: any callable with one of these parameter lists, returning a ConvertedSurface or a
-/// pointer that converts to it. Use the second one to add content that surfaces do not contain, such as models of a game's own,
-/// or materials per vertex.
+/// pointer that converts to it. Use the second one to add content that surfaces do not contain, such as models of a
+/// game's own, or materials per vertex.
 ///
 ///   [](const quoin::SurfaceUpdate& update) { ... }
 ///   [](const quoin::SurfaceUpdate& update, const quoin::SurfaceContext& context) { ... }
@@ -146,11 +146,11 @@ class LiveMeshes {
   LiveMeshes(const LiveMeshes&) = delete;
   LiveMeshes& operator=(const LiveMeshes&) = delete;
 
-  /// Applies the scene's changes since the last update: voxels, data of types with VoxelProperties::remesh_on_data,
-  /// grids, visibility, shapes and orientations of types (smooth: also colour), and instances that show a grid for the first time or no longer
-  /// show it. Chunks nearest to an eye (world coordinates) come first. Call it after edits, and once per frame while
-  /// `pending` is not 0: each call queues only enough chunks to keep the workers busy. Eyes that are not finite are
-  /// ignored; if all are, every chunk has distance 0.
+  /// Applies the scene's changes since the last update: voxels, data of types whose data changes meshes
+  /// (VoxelRegistry::remeshes_on_data), grids, visibility, shapes and orientations of types (smooth: also colour), and
+  /// instances that show a grid for the first time or no longer show it. Chunks nearest to an eye (world coordinates)
+  /// come first. Call it after edits, and once per frame while `pending` is not 0: each call queues only enough chunks
+  /// to keep the workers busy. Eyes that are not finite are ignored; if all are, every chunk has distance 0.
   ///
   /// Returns the number of this call: 1, 2, 3 and so on.
   ///

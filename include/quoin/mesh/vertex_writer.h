@@ -41,8 +41,8 @@ enum class VertexAttribute : std::uint8_t {
   /// to the lowest corner of the face, which all triangles that share vertices form.
   TextureUv,
   /// Tint of the face; for types without textures their colour. The face shows tint times texture. For these three,
-  /// vertices of views with a look of their own (VertexLook) have the face that it names, and those of shapes the face
-  /// of `look_of`, with the coordinates of `texture_uv`.
+  /// vertices of views with a look of their own (VertexLook) have the face that it names; vertices of shapes have the
+  /// face from `look_of`, with the coordinates of `texture_uv`.
   Tint,
 };
 

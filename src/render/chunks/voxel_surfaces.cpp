@@ -23,7 +23,7 @@ bool has_solid_first_layer(const Chunk* chunk, std::size_t axis) {
 // The voxels of a chunk whose data no surface of another chunk reads.
 constexpr IBox kInnerVoxels{IVec3(kShapeReach), IVec3(kChunkEdge - kShapeReach)};
 
-// Distance in voxels up to which light changes that of a shape's face: see SurfaceLight::read.
+// Reach of light: a voxel's light affects that of shapes' faces at most this many voxels away (SurfaceLight::read).
 constexpr int kShapeLightReach = 3;
 
 // Partial grids: the densities of a chunk depend on the chunk and its 26 neighbours.
