@@ -191,9 +191,9 @@ void draw_tool_part(ViewState& state, MenuChoice& choice) {
   int shape = static_cast<int>(state.brush.shape);
   if (ImGui::Combo("shape", &shape, "box\0sphere\0")) state.brush.shape = static_cast<BrushShape>(shape);
   ImGui::SliderInt("radius", &state.brush.radius, 0, kMaxBrush, "%d", ImGuiSliderFlags_AlwaysClamp);
-  draw_turns(state);
   draw_palette(state);
   draw_new_colour(state);
+  draw_turns(state);  // below the palette, which thus stays in its place
   const EditHistory& history = state.open.document->history();
   ImGui::BeginDisabled(!history.can_undo());
   command_button(Command::Undo, "Undo", choice);
