@@ -251,14 +251,14 @@ enum { /* rules for the front of a placed voxel */
            3 /* the direction of the face that was hit, if it is a side; else towards the player */
 };
 
-/* The face of a voxel at which a player places another voxel. Vectors are in the grid's space. */
+/* A player's hit on the face of a voxel, next to the voxel to place. Vectors are in the grid's space. */
 typedef struct quoin_placing {
   size_t size;
   int32_t face;     /* the direction of the face */
   int32_t front;    /* QUOIN_FRONT_... */
   float point[3];   /* the point that was hit, in voxels from the hit voxel's minimum corner */
   int32_t reserved; /* ignored */
-  double look[3];   /* the direction in which the player looks, of any length */
+  double look[3];   /* direction of the player's view, of any length */
 } quoin_placing;
 
 /* One placement of a grid in the world. */
@@ -513,8 +513,8 @@ QUOIN_API quoin_status quoin_orientation_turn(int32_t orientation, int32_t axis,
 /* Gets the state of a voxel after it was turned, such as in a copy. Other bits stay as they were. */
 QUOIN_API quoin_status quoin_type_turned_state(quoin_scene scene, size_t type, uint32_t state, int32_t orientation,
                                                uint32_t* out);
-/* Gets the state with which a player places a voxel of a type: the orientation that fits the face best, with the other
- * bits of `state`. Torches point away from the face, slabs and stairs go into the half that was hit, fronts follow the
+/* Gets the state of a voxel that a player places: the orientation that fits the face best, with the other bits of
+ * `state`. Torches point away from the face, slabs and stairs go into the half that was hit, fronts follow the
  * player. */
 QUOIN_API quoin_status quoin_type_placed_state(quoin_scene scene, size_t type, const quoin_placing* placing,
                                                uint32_t state, uint32_t* out);
@@ -556,8 +556,8 @@ QUOIN_API quoin_status quoin_grid_read(quoin_scene scene, size_t grid, const int
  * array->origin, rounded down to whole voxels. `name` may be null. `out` receives the grid's number and may be null. */
 QUOIN_API quoin_status quoin_grid_add(quoin_scene scene, const quoin_array* array, const char* name, size_t* out);
 
-/* Every voxel except air has a state, 32 bits, 0 by default. The type decides what it means: orientations and shapes
- * select by it. Setting a voxel to another type makes its state 0; setting it to the same type keeps the state. */
+/* Every voxel except air has a state, 32 bits, 0 by default. It selects among the orientations and shapes of the
+ * voxel's type. Setting a voxel to another type makes its state 0; setting it to the same type keeps the state. */
 
 /* Writes the states of a box into uint32_t out[capacity]; otherwise as quoin_grid_read. */
 QUOIN_API quoin_status quoin_grid_read_states(quoin_scene scene, size_t grid, const int32_t min[3],

@@ -72,13 +72,13 @@ Result<VoxelFace> face_of(const quoin_face& given, Texels texels) {
 }
 
 // Calls `visit(struct, index)` for each struct of an array; the `size` of each one gives the position of the next.
-// `what`: names them in errors.
+// `noun`: names one of them in errors.
 template <class Struct, class Visit>
-Status visit_array(const Struct* array, std::size_t count, const char* what, Visit&& visit) {
+Status visit_array(const Struct* array, std::size_t count, const char* noun, Visit&& visit) {
   const auto* at = reinterpret_cast<const std::byte*>(array);
   for (std::size_t i = 0; i < count; ++i) {
     const auto given = taken(reinterpret_cast<const Struct*>(at));
-    if (!given) return invalid("the " + std::string(what) + " " + std::to_string(i) + " is null, or its size");
+    if (!given) return invalid("the " + std::string(noun) + " " + std::to_string(i) + " is null, or its size");
     if (Status visited = visit(*given, i); !visited) return visited;
     at += given->size;
   }
@@ -306,10 +306,10 @@ Result<VoxelShapes> shapes_of(const quoin_shapes* shapes) {
   if (!given) return make_error(ErrorCode::InvalidArgument, "invalid size of the shapes");
   if (const char* wrong = validate_shapes(*given)) return make_error(ErrorCode::InvalidArgument, wrong);
   // Adds the result of `convert` for each struct of an array; errors name the struct's number.
-  const auto convert_all = [](const auto* array, std::size_t count, const char* what, auto& out, auto&& convert) {
-    return visit_array(array, count, what, [&](const auto& one, std::size_t number) -> Status {
+  const auto convert_all = [](const auto* array, std::size_t count, const char* noun, auto& out, auto&& convert) {
+    return visit_array(array, count, noun, [&](const auto& one, std::size_t number) -> Status {
       auto made = convert(one);
-      if (!made) return invalid(std::string(what) + " " + std::to_string(number) + ": " + made.error().message);
+      if (!made) return invalid(std::string(noun) + " " + std::to_string(number) + ": " + made.error().message);
       out.push_back(std::move(*made));
       return {};
     });

@@ -306,8 +306,8 @@ class Grid:
 
     def states(self, origin: Optional[Sequence[int]] = None, shape: Optional[Sequence[int]] = None) -> NdArray:
         """Copies the states of a box's voxels to a new array: uint32, (nx, ny, nz). `origin`, `shape`: as in
-        `to_numpy`. A state has 32 bits and is 0 by default. Types decide what it means: their orientations and shapes
-        select by it."""
+        `to_numpy`. A state has 32 bits and is 0 by default. It selects among the orientations and shapes of the
+        voxel's type."""
         return self._read(_c.lib.quoin_grid_read_states, np.uint32, origin, shape)
 
     def _read(self, function: Any, dtype: Any, origin: Optional[Sequence[int]],
@@ -640,11 +640,11 @@ class Scene:
 
     def placed_state(self, type: int, face: str, look: Sequence[float], point: Sequence[float] = (0.5, 1.0, 0.5),
                      state: int = 0, front: Optional[str] = None) -> int:
-        """Returns the state with which a player places a voxel of a type at a face: the orientation that fits best,
-        with the other bits of `state`. Torches point away from the face, slabs and stairs go into the half that was
+        """Returns the state of a voxel that a player places at a face: the orientation that fits best, with the other
+        bits of `state`. Torches point away from the face, slabs and stairs go into the half that was
         hit.
 
-        `face`: direction of the face that was hit. `look`: direction in which the player looks. `point`: the point that
+        `face`: direction of the face that was hit. `look`: direction of the player's view. `point`: the point that
         was hit, in voxels from the hit voxel's minimum corner. All are in the grid's space. `front`: the front turns
         "towards_player", "away_from_player" or "away_from_wall" (the direction of the face); None: by the shape, away
         from the player for stairs.

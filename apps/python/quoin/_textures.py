@@ -256,9 +256,9 @@ def _fill(struct: Any, face: Face) -> NdArray:
     return image
 
 
-def _number_of(name: Any, names: Sequence[Any], what: str) -> int:
+def _number_of(name: Any, names: Sequence[Any], label: str) -> int:
     if name not in names:
-        raise ValueError(f"{what} must be one of {', '.join(map(str, names))}, not {name!r}")
+        raise ValueError(f"{label} must be one of {', '.join(map(str, names))}, not {name!r}")
     return names.index(name)
 
 

@@ -122,7 +122,7 @@ enum class PlacedFront : std::uint8_t {
 struct PlacingHit {
   Direction face = Direction::PosY;  ///< the face that was hit (SceneHit::face)
   Vec3 point{0.5F, 1.0F, 0.5F};      ///< the point that was hit, in voxels from the hit voxel's minimum corner
-  DVec3 look{1.0, 0.0, 0.0};         ///< the direction in which the player looks, of any length
+  DVec3 look{1.0, 0.0, 0.0};         ///< direction of the player's view, of any length
   /// nullopt: by the unturned shape. AwayFromPlayer if most of its surface is on the side of the front (stairs),
   /// AwayFromWall if most of it is at the back (a torch at a wall, a ladder), else TowardsPlayer (cubes).
   std::optional<PlacedFront> front{};
