@@ -131,8 +131,8 @@ struct PlacingHit {
 /// Returns the state of a voxel that a player places: selects the type's orientation that fits the hit best, and keeps
 /// the other bits of `state`.
 ///
-/// +Y matters first. If orientations turn it sideways (a torch, a log), it points away from the face that was hit, or at
-/// least along its axis. If they only turn it up or down (slabs, stairs), it points down below a ceiling and in the
+/// +Y matters first. If orientations turn it sideways (a torch, a log), it points away from the face that was hit, or
+/// at least along its axis. If they only turn it up or down (slabs, stairs), it points down below a ceiling and in the
 /// upper half of a side. Among equal ones, the front decides (PlacedFront); then the lowest value.
 ///
 ///   if (const auto hit = pick(tracer, camera, pixel)) {

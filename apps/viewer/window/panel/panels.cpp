@@ -367,8 +367,8 @@ void draw_sphere(const WorldLines& lines, const Instance& instance, const SceneG
   }
 }
 
-/// Returns the shape of the voxel under the mouse, or of the one that the tool would place in front of it. Null: a cube.
-/// A placed shape is shown without connections to its neighbours.
+/// Returns the shape of the voxel under the mouse, or of the one that the tool would place in front of it (null: a
+/// cube). A placed shape is shown without connections to its neighbours.
 const ShapeModel* outlined_shape(const ViewState& state, const Instance& instance, const SceneGrid& grid) {
   const SceneHit& hit = *state.hover;
   const VoxelRegistry& types = state.scene().types;
