@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <span>
 
 #include <glm/common.hpp>
@@ -154,18 +153,11 @@ FaceTexels face_texels(const VoxelFace& face, Direction direction, float emissio
 
 Vec3 triplanar_colour(const TypeFaces& faces, const FieldPoint& point) {
   const Vec3& n = point.normal;
-  const float rise = std::clamp((std::abs(n.y) - faces.steep_y) / (faces.flat_y - faces.steep_y), 0.0F, 1.0F);
-  std::array<float, 3> weights{};
-  weights[1] = rise * rise * (3.0F - 2.0F * rise);
-  // Fourth powers keep the range narrow in which both pairs of sides are seen.
-  const float x = n.x * n.x * n.x * n.x;
-  const float z = n.z * n.z * n.z * n.z;
-  const float share_of_x = x + z > 0.0F ? x / (x + z) : 0.5F;
-  weights[0] = (1.0F - weights[1]) * share_of_x;
-  weights[2] = (1.0F - weights[1]) * (1.0F - share_of_x);
-  const DVec3 position = point.position * double{faces.field_scale};
+  const std::array<float, 3> weights = faces.on_fields.weights(n);
+  const double scale = faces.on_fields.textures_per_voxel;
+  const DVec3 position = point.position * scale;
   const DVec3 inside = position - glm::floor(position);
-  const double square = point.square_spacing * double{faces.field_scale} * double{faces.field_scale};
+  const double square = point.square_spacing * scale * scale;
   Vec3 colour(0.0F);
   for (int axis = 0; axis < 3; ++axis) {
     const float weight = weights[static_cast<std::size_t>(axis)];
@@ -220,12 +212,7 @@ void Surfaces::put(VoxelType type, const VoxelProperties& properties) {
   const auto made = std::make_shared<TypeFaces>();
   made->kept = properties.faces;
   made->content = content_of(properties, clouds_);
-  const FieldTextures& field = properties.field_textures;
-  constexpr float kRadians = std::numbers::pi_v<float> / 180.0F;
-  made->field_scale = 1.0F / field.voxels;
-  made->flat_y = std::cos(field.flat_degrees * kRadians);
-  // Slopes that hardly differ can have the same cosine.
-  made->steep_y = std::min(std::cos(field.steep_degrees * kRadians), std::nextafter(made->flat_y, 0.0F));
+  made->on_fields = TriplanarRule(properties.field_textures);
   for (const Direction each : kDirections) {
     made->sides[static_cast<std::size_t>(each)] = face_texels(properties.faces[each], each, emission_of(properties));
   }

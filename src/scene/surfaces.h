@@ -129,11 +129,7 @@ struct TypeFaces {
   VoxelFaces kept;  ///< owns the texels
   CellContent content = CellContent::Glass;
   std::array<FaceTexels, 6> sides;  ///< by direction
-  /// On fields (FieldTextures): textures per voxel, and the y of unit normals from where sides, or only upper and lower
-  /// textures, are seen.
-  float field_scale = 1.0F;
-  float steep_y = 0.0F;
-  float flat_y = 1.0F;
+  TriplanarRule on_fields;
 };
 
 /// A point of a field's surface that shows textures.
@@ -144,8 +140,6 @@ struct FieldPoint {
 };
 
 /// Returns the colour of a material at a point: its textures along the three axes, weighted by the normal.
-///
-/// Source: R. Geiss, "Generating complex procedural terrains using the GPU" (GPU Gems 3, 2007), triplanar texturing.
 [[nodiscard]] Vec3 triplanar_colour(const TypeFaces& faces, const FieldPoint& point);
 
 /// Surfaces by type. Unregistered ids give a conspicuous magenta.

@@ -1,9 +1,13 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -51,6 +55,38 @@ struct FieldTextures {
   float steep_degrees = 55.0F;  ///< from this slope on, it shows those of the sides only; blended in between
 
   bool operator==(const FieldTextures&) const = default;
+};
+
+/// The rule of FieldTextures, prepared for many points. A point of a field's surface shows up to three of a type's
+/// textures, one per axis of the grid: the upper side's (PosX, PosY, PosZ) where the normal's component is at least 0,
+/// else the lower side's. A texture lies on the surface as it lies on its face of a voxel at the position
+/// fract(p * textures_per_voxel), where p is the point in voxels of the full grid.
+///
+/// Source: R. Geiss, "Generating complex procedural terrains using the GPU" (GPU Gems 3, 2007), triplanar texturing.
+struct TriplanarRule {
+  float textures_per_voxel = 1.0F;
+  float steep_y = 0.0F;  ///< unit normals with at most this |y| show textures of sides only
+  float flat_y = 1.0F;   ///< unit normals with at least this |y| show the upper or lower texture only
+
+  TriplanarRule() = default;
+  explicit TriplanarRule(const FieldTextures& textures) : textures_per_voxel(1.0F / textures.voxels) {
+    constexpr float kRadians = std::numbers::pi_v<float> / 180.0F;
+    flat_y = std::cos(textures.flat_degrees * kRadians);
+    // Slopes that hardly differ can have the same cosine.
+    steep_y = std::min(std::cos(textures.steep_degrees * kRadians), std::nextafter(flat_y, 0.0F));
+  }
+
+  /// Returns the weights of the textures along x, y and z. Their sum is 1. `normal`: unit, or 0 for sides in equal
+  /// parts.
+  [[nodiscard]] std::array<float, 3> weights(const Vec3& normal) const {
+    const float rise = std::clamp((std::abs(normal.y) - steep_y) / (flat_y - steep_y), 0.0F, 1.0F);
+    const float upper = rise * rise * (3.0F - 2.0F * rise);
+    // Fourth powers keep the range narrow in which both pairs of sides are seen.
+    const float x = normal.x * normal.x * normal.x * normal.x;
+    const float z = normal.z * normal.z * normal.z * normal.z;
+    const float share_of_x = x + z > 0.0F ? x / (x + z) : 0.5F;
+    return {(1.0F - upper) * share_of_x, upper, (1.0F - upper) * (1.0F - share_of_x)};
+  }
 };
 
 /// The properties of a voxel type.
