@@ -143,7 +143,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Ve
 };
 // A face of a type: the address of its texels, of all mipmap levels, level 0 first. Then in bits 0-3 log2 of the texels
 // per side; and for the texture's rows (bits 4-6) and columns (8-10) the axis of the grid, plus 4 if they run against
-// it. `tint`: in linear light; w: the emission.
+// it; a word for fields: field_textures.glsl. `tint`: in linear light; w: the emission.
 struct TexturedFace {
   uvec4 what;
   vec4 tint;

@@ -1,5 +1,6 @@
 // The surface of a field; matches Surfaces::blend_of_field on the CPU. The including file defines `Surface`,
-// `surface_of`, `white_surface` and `mix_look`.
+// `surface_of`, `white_surface` and `mix_look`. With SHOWS_FIELD_TEXTURES it also includes field_textures.glsl and sets
+// `blended_point`, where materials show their textures.
 
 // Gets the samples around a cell's word. Returns false if the word has none because all samples are solid.
 bool samples_around(Tree field, ivec3 cell, out Numbers block) {
@@ -22,10 +23,19 @@ Surface surface_of_material(uint type) {
   return surface_of(type);
 }
 
+// Returns the surface of a material at the point that is blended.
+Surface surface_of_share(uint type) {
+  Surface surface = surface_of_material(type);
+#ifdef SHOWS_FIELD_TEXTURES
+  if (kHasTextures) show_on_field(type, blended_point, surface);
+#endif
+  return surface;
+}
+
 // Returns the look at a point `inside` a cell, blended from the solid samples of the 27 around. `nearest`: the nearest
 // sample's material.
 Surface blend_of_field(Tree field, ivec3 cell, vec3 inside, uint nearest) {
-  Surface blend = surface_of_material(nearest);
+  Surface blend = surface_of_share(nearest);
   Numbers block;
   if (!samples_around(field, cell, block)) return blend;
   ivec3 nearer = ivec3(greaterThanEqual(inside, vec3(0.5)));
@@ -41,7 +51,7 @@ Surface blend_of_field(Tree field, ivec3 cell, vec3 inside, uint nearest) {
     bool is_solid = floatBitsToInt(sample_of(block, (cell & 3) + 1 + corner)) < 0;
     if (!is_solid || !(share > 0.0)) continue;
     uint type = type_at(field, cell + corner);
-    if (type != known) look = surface_of_material(type);
+    if (type != known) look = surface_of_share(type);
     known = type;
     total += share;
     mix_look(look, share / total, blend);

@@ -11,6 +11,9 @@ layout(constant_id = 0) const bool kHasGlass = true;
 #include "glass.glsl"
 #include "sky.glsl"
 #include "direct_light.glsl"
+#include "field_textures.glsl"
+#define SHOWS_FIELD_TEXTURES
+FieldPoint blended_point;
 #include "field_blend.glsl"
 #include "corners.glsl"
 #include "levels.glsl"
@@ -193,6 +196,15 @@ void trace_light(Point point, Placed placed, uint slot, out vec3 light, out floa
   openness = openness_of(point, placed, open);
 }
 
+// Returns a point of a field's surface, for the textures of its materials.
+FieldPoint field_point(Point point, Placed placed) {
+  float voxels = placed.ref_view.w;
+  float spacing = frame().down.w;
+  spacing *= has(kPerspective) ? point.inside.w / placed.ref_inside.w : 1.0 / placed.ref_inside.w;
+  ivec3 voxel = (point.voxel.xyz + placed.origin.xyz) << placed.origin.w;
+  return FieldPoint(voxel, point.inside.xyz * voxels, normal_of(point.what.y), spacing * spacing * voxels * voxels);
+}
+
 // Shows the texture of a voxel's face. Seen from inside, it lies around the ray's start.
 void show_texture(Point point, Placed placed, inout Surface surface) {
   uint face = point.what.y;
@@ -221,6 +233,7 @@ Surface surface_at(Point point, Placed placed) {
     bool is_far = (point.what.z & kIsFar) != 0;
     vec3 at = point.inside.xyz - (is_far ? kSurfelLift * normal_of(point.what.y) : vec3(0.0));
     vec3 cell = floor(at);
+    if (kHasTextures) blended_point = field_point(point, placed);
     return blend_of_field(opaque_tree(placed, 1), point.voxel.xyz + ivec3(cell), at - cell, point.what.x);
   } else if (kHasTextures && !is_of_field(point)) {
     show_texture(point, placed, surface);

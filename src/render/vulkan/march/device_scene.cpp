@@ -2,6 +2,9 @@
 #include "scene/tracer/placed_grid.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
 #include <cstring>
 #include <utility>
 
@@ -43,6 +46,18 @@ const char* const kSendingTextures = "uploading textures";
 ShaderTexturedFace shader_face(const FaceTexels& face, std::uint64_t address) {
   const auto axis = [&](std::size_t i) { return std::uint32_t{face.axis[i]} | (face.scale[i] < 0.0 ? 4U : 0U); };
   return {address, face.log_size | axis(0) << 4 | axis(1) << 8, 0, Vec4(face.tint, face.emission)};
+}
+
+// Returns the words of a type's six faces that hold its TriplanarRule: field_textures.glsl.
+std::array<std::uint32_t, 6> words_of(const TriplanarRule& rule) {
+  // A float from 2^-12 on has no bits below 2^-36: the product with 2^64 is a whole number.
+  const auto fraction = static_cast<std::uint64_t>(std::ldexp(std::fmod(double{rule.textures_per_voxel}, 1.0), 64));
+  return {std::bit_cast<std::uint32_t>(rule.steep_y),
+          std::bit_cast<std::uint32_t>(rule.flat_y),
+          std::bit_cast<std::uint32_t>(rule.textures_per_voxel),
+          static_cast<std::uint32_t>(fraction >> 32),
+          static_cast<std::uint32_t>(fraction),
+          0};
 }
 
 PlacedGrid placed_as(const Instance& instance, const SceneGrid& grid, InstanceHandle handle) {
@@ -248,10 +263,12 @@ Status DeviceTextures::try_put(const VoxelRegistry& types) {
   for (std::size_t i = 0; types.has_textures() && i < types.size(); ++i) {
     const VoxelProperties& type = types[static_cast<VoxelType>(i)];
     if (type.faces.empty() || type.visibility != Visibility::Opaque) continue;
+    const std::array<std::uint32_t, 6> rule = words_of(TriplanarRule(type.field_textures));
     for (const Direction direction : kDirections) {
       const auto address = send(type.faces[direction].texture, used);
       if (!address) return address.error();
       faces.push_back(shader_face(face_texels(type.faces[direction], direction, emission_of(type)), *address));
+      faces.back().on_fields = rule[static_cast<std::size_t>(direction)];
     }
     numbers[i] = static_cast<std::uint32_t>(faces.size() / kDirections.size());
   }

@@ -249,7 +249,7 @@ struct ShaderFrame {
 struct ShaderTexturedFace {
   std::uint64_t texels = 0;
   std::uint32_t shape = 0;
-  std::uint32_t pad = 0;
+  std::uint32_t on_fields = 0;
   Vec4 tint{0.0F};
 };
 
