@@ -42,6 +42,10 @@ bool can_write(const VertexElement& element, VertexSource source) {
       return !is_smooth && format == Float32x2;
     case VertexAttribute::Tint:
       return !is_smooth && is_one_of(format, {Float32x4, Unorm16x4, Unorm8x4, Unorm8x4Srgb});
+    case VertexAttribute::Materials:
+      return source == VertexSource::Smooth && format == Uint16x4;
+    case VertexAttribute::Weights:
+      return source == VertexSource::Smooth && is_one_of(format, {Unorm8x4, Float32x4});
   }
   return false;
 }
@@ -59,6 +63,7 @@ std::size_t size_of(VertexFormat format) {
     case Float32x2:
     case Sint16x4:
     case Unorm16x4:
+    case Uint16x4:
       return 8;
     case Float32x3:
       return 12;

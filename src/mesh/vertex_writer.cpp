@@ -170,6 +170,26 @@ void put_numbers(VertexFormat format, const Source& numbers) {
   }
 }
 
+// Returns the materials of a smooth vertex.
+VertexMaterials materials_at(const MeshView& mesh, std::size_t vertex) {
+  if (!mesh.materials.empty()) return mesh.materials[vertex];
+  VertexMaterials only;
+  only.types[0] = mesh.types.empty() ? kAir : mesh.types[vertex];
+  only.weights[0] = 255;
+  return only;
+}
+
+template <class Source>
+void put_weights(VertexFormat format, const Source& materials) {
+  if (format == VertexFormat::Unorm8x4) {
+    return materials.template put<Byte4>([](const VertexMaterials& each) { return each.weights; });
+  }
+  materials.template put<Float4>([](const VertexMaterials& each) {
+    const auto share = [&](std::size_t i) { return static_cast<float>(each.weights[i]) / 255.0F; };
+    return Float4{share(0), share(1), share(2), share(3)};
+  });
+}
+
 // Returns the first bytes of an encoded colour.
 template <std::size_t kSize>
 std::array<std::byte, kSize> first_bytes(const std::array<std::byte, 16>& bytes) {
@@ -496,6 +516,9 @@ void VertexWriter::write_element(std::size_t index, std::span<const Quad> quads,
     case VertexAttribute::Tint:
       return put_encoded(
           format, PerQuad{column, quads, [&](Quad quad) -> const Colour& { return colour(index, face_number(quad)); }});
+    case VertexAttribute::Materials:  // quads have none
+    case VertexAttribute::Weights:
+      return;
   }
 }
 
@@ -658,6 +681,9 @@ void VertexWriter::write_element(std::size_t index, const ShapeBlock& block, Vec
                                            const auto [type, direction] = number_of(face);
                                            return colour(index, face_number(type, direction));
                                          }});
+    case VertexAttribute::Materials:  // faces of shapes have none
+    case VertexAttribute::Weights:
+      return;
   }
 }
 
@@ -722,6 +748,11 @@ void VertexWriter::write_element(std::size_t index, const MeshView& mesh, const 
                            if (look != 0) return faces.tints[index][look - 1];
                            return colour(index, face_number(mesh.types[first + i], mesh.directions[first + i]));
                          }));
+    case VertexAttribute::Materials:
+      return vertices([&](auto i) { return materials_at(mesh, first + i); })
+          .template put<std::array<VoxelType, 4>>([](const VertexMaterials& each) { return each.types; });
+    case VertexAttribute::Weights:
+      return put_weights(format, vertices([&](auto i) { return materials_at(mesh, first + i); }));
     case VertexAttribute::Uv:         // no view has any
     case VertexAttribute::TextureUv:  // written by write_view
       return;

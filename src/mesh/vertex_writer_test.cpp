@@ -536,6 +536,44 @@ TEST(VertexWriter, WritesSmoothMeshes) {
   }
 }
 
+TEST(VertexWriter, WritesMaterialsOfSmoothMeshes) {
+  VoxelRegistry types = oracle::mixed_types();
+  DensityGrid field;
+  field.add_sphere({30.0, 31.0, 29.0}, 7.5, 1);
+  field.add_sphere({36.0, 31.0, 29.0}, 7.5, 2);
+  SmoothMeshOptions options;
+  options.materials = true;
+  SmoothMesh mesh = build_smooth_mesh(field, types, options).value();
+  align_materials(mesh);
+  const VertexLayout layout = {28,
+                               {{VertexAttribute::Materials, Uint16x4, 0},
+                                {VertexAttribute::Weights, Unorm8x4, 8},
+                                {VertexAttribute::Weights, Float32x4, 12}}};
+  ASSERT_TRUE(can_write(layout, VertexSource::Smooth));
+  EXPECT_FALSE(can_write(layout, VertexSource::SmoothChunk));
+  EXPECT_FALSE(can_write(layout, VertexSource::Quads));
+  const VertexWriter writer(layout, types);
+  std::vector<std::byte> found(writer.bytes_needed(mesh.positions.size()));
+  writer.write(view_of(mesh), Vec3(0.0F), found);
+  std::size_t mixed = 0;
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const VertexMaterials& expected = mesh.materials[i];
+    ASSERT_EQ((read<std::array<VoxelType, 4>>(found, 28 * i)), expected.types);
+    ASSERT_EQ((read<std::array<std::uint8_t, 4>>(found, 28 * i + 8)), expected.weights);
+    const auto shares = read<std::array<float, 4>>(found, 28 * i + 12);
+    for (std::size_t k = 0; k < 4; ++k) ASSERT_EQ(shares[k], static_cast<float>(expected.weights[k]) / 255.0F);
+    mixed += expected.weights[1] != 0 ? 1 : 0;
+  }
+  EXPECT_GT(mixed, 10U);
+  // Without materials a vertex has its type.
+  mesh.materials.clear();
+  MeshView view = view_of(mesh);
+  view.types = mesh.types;
+  writer.write(view, Vec3(0.0F), found);
+  EXPECT_EQ((read<std::array<VoxelType, 4>>(found, 0)), (std::array<VoxelType, 4>{mesh.types[0], 0, 0, 0}));
+  EXPECT_EQ((read<std::array<std::uint8_t, 4>>(found, 8)), (std::array<std::uint8_t, 4>{255, 0, 0, 0}));
+}
+
 TEST(VertexWriter, ReversesClockwiseTriangles) {
   for (const bool flipped : {false, true}) {
     const auto& plain = triangle_corners(flipped);

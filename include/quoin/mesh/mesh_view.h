@@ -45,9 +45,10 @@ struct MeshView {
   /// without further shading.
   std::span<const LinearRgba16> light;
 
-  std::span<const Vec3> normals;         ///< unit length
-  std::span<const LinearRgba16> albedo;  ///< without occlusion
-  std::span<const float> occlusion;      ///< 0 (open) to 1 (dark)
+  std::span<const Vec3> normals;               ///< unit length
+  std::span<const LinearRgba16> albedo;        ///< without occlusion
+  std::span<const float> occlusion;            ///< 0 (open) to 1 (dark)
+  std::span<const VertexMaterials> materials;  ///< aligned (align_materials); empty: `types`, or unknown
 
   /// Returns true if the view is of the smooth kind.
   [[nodiscard]] bool has_albedo() const { return !albedo.empty(); }
@@ -90,6 +91,7 @@ struct MeshView {
   view.normals = mesh.normals;
   view.albedo = mesh.albedo;
   view.occlusion = mesh.occlusion;
+  view.materials = mesh.materials;
   return view;
 }
 

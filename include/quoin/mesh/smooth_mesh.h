@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <vector>
@@ -20,16 +21,29 @@ using LinearRgba16 = std::array<std::uint16_t, 4>;
 /// Converts an sRGB colour to linear light. Alpha is linear already.
 [[nodiscard]] LinearRgba16 linear_colour_of(Rgba8 colour);
 
+/// The materials of a vertex and their weights: those of the samples whose mean colour is its albedo, at most the four
+/// most frequent. Neighbouring chunks give the vertices that they share equal materials and weights.
+struct VertexMaterials {
+  static constexpr std::size_t kSlots = 4;
+  std::array<VoxelType, kSlots> types{};       ///< ascending; slots without a material come last, with kAir
+  std::array<std::uint8_t, kSlots> weights{};  ///< 255 in total; slots without a material have 0
+
+  bool operator==(const VertexMaterials&) const = default;
+};
+
 /// A welded surface. The vertex arrays have one entry per vertex.
 struct SmoothMesh {
   std::vector<Vec3> positions;   ///< the field's coordinates, in samples
   std::vector<Vec3> normals;     ///< unit length, towards the air
   std::vector<float> occlusion;  ///< 0 (open) to 1 (dark); empty with SmoothOcclusion::None
   /// Mean colour of the materials of the cell's solid samples, without occlusion. Coarse cells use only the solid
-  /// samples next to the surface.
+  /// samples next to the surface. Materials with textures count with the mean colours that these have on a surface of
+  /// this normal (TriplanarRule).
   std::vector<LinearRgba16> albedo;
   std::vector<VoxelType> types;        ///< most frequent material of these samples; the lowest on ties
   std::vector<std::uint32_t> indices;  ///< three per triangle, counter-clockwise seen from the air
+  /// For textures; empty without SmoothMeshOptions::materials. Graphics hardware needs them aligned: align_materials.
+  std::vector<VertexMaterials> materials;
 };
 
 /// Selects how the materials of samples become surface colours.
@@ -55,6 +69,7 @@ struct SmoothMeshOptions {
   /// Returns the level of detail of a chunk, 0 to kMaxSmoothLevel. Empty: 0 everywhere. Called once per chunk on the
   /// calling thread, also for neighbours that do not exist.
   std::function<int(IVec3 chunk)> level_of{};
+  bool materials = false;  ///< fills SmoothMesh::materials
 };
 
 /// Meshes a whole field, chunk by chunk, and welds the chunk meshes.
@@ -94,6 +109,16 @@ struct SmoothMeshOptions {
 /// As above. `tags`: one number per vertex, which stays with the vertex, or empty.
 [[nodiscard]] Result<float> simplify_smooth_mesh(SmoothMesh& mesh, float error_in_samples,
                                                  std::vector<std::uint32_t>& tags);
+
+/// Prepares the materials of a mesh for interpolation: afterwards the three vertices of each triangle have the same types
+/// in the same slots, some with weight 0. Vertices between triangles of different materials are duplicated, with equal
+/// positions, normals and weights. Call it after `simplify_smooth_mesh`. Does nothing to a mesh without materials.
+///
+/// Many: where more than four materials meet in a triangle, it keeps the four with the greatest sums of weights (of equal
+///       ones the lowest types). The weights of the others go to the heaviest one of their vertex that is kept, or to
+///       the first one.
+/// Cost: O(vertices + triangles).
+void align_materials(SmoothMesh& mesh);
 
 /// Returns true if this build can simplify (has meshoptimizer).
 [[nodiscard]] bool can_simplify();

@@ -44,6 +44,8 @@ enum class VertexAttribute : std::uint8_t {
   /// vertices of views with a look of their own (VertexLook) have the face that it names; vertices of shapes have the
   /// face from `look_of`, with the coordinates of `texture_uv`.
   Tint,
+  Materials,  ///< VertexMaterials::types; of views without materials the vertex's type, else kAir, and kAir
+  Weights,    ///< VertexMaterials::weights; of views without materials 1, 0, 0, 0
 };
 
 /// Memory format of an attribute: native byte order, no padding between components.
@@ -63,6 +65,7 @@ enum class VertexFormat : std::uint8_t {
   Unorm8x4,      ///< for colours: linear
   Unorm8x4Srgb,  ///< for colours: sRGB-encoded, alpha linear
   Unorm16x4,     ///< 65,535 is 1
+  Uint16x4,
 };
 /// Returns the size of a format in bytes, 1 to 16.
 [[nodiscard]] std::size_t size_of(VertexFormat format);
@@ -88,6 +91,8 @@ struct VertexElement {
 /// | Texture | Uint16, Uint32 | |
 /// | TextureUv | Float32x2 | |
 /// | Tint | as Colour | 1 for faces with textures, else alpha |
+/// | Materials | Uint16x4 | |
+/// | Weights | Unorm8x4, Float32x4 | |
 struct VertexLayout {
   std::uint32_t stride = 0;  ///< bytes per vertex, 1 to kMaxStride
   std::vector<VertexElement> elements;
@@ -97,11 +102,11 @@ struct VertexLayout {
 
 /// Source of vertices.
 enum class VertexSource : std::uint8_t {
-  Quads,        ///< has all attributes
-  Blocks,       ///< MeshView of blocks: all except Uv; positions as floats
+  Quads,        ///< has all attributes except Materials and Weights
+  Blocks,       ///< MeshView of blocks: as Quads except Uv; positions as floats
   SmoothChunk,  ///< SmoothChunkMesh: Position as floats, Normal, Brightness
-  Smooth,       ///< MeshView of a smooth mesh: as SmoothChunk, plus Colour
-  Shapes,       ///< faces of shapes: has all attributes, with fractions of voxels
+  Smooth,       ///< MeshView of a smooth mesh: as SmoothChunk, plus Colour, Materials, Weights
+  Shapes,       ///< faces of shapes: as Quads, with fractions of voxels
 };
 
 /// Returns true if vertices of this source can be written in the layout: the stride is in range, the elements lie

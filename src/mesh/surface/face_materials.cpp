@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include <quoin/core/assert.h>
@@ -20,9 +21,6 @@ constexpr LinearRgba16 kWhite = {65'535, 65'535, 65'535, 65'535};
 std::uint16_t linear16(std::uint8_t encoded) {
   return static_cast<std::uint16_t>(std::lround(linear_from_srgb(encoded) * 65'535.0F));
 }
-
-// Most samples that a cell can have, along three sides of 9.
-constexpr std::size_t kMaxCellSamples = 729;
 
 // The solid samples of all bodies.
 struct AnySolid {
@@ -126,6 +124,49 @@ SurfaceMaterials::SurfaceMaterials(const VoxelRegistry& types) : albedo_(types.s
   for (std::size_t i = kAir + 1; i < albedo_.size(); ++i) {
     albedo_[i] = decoded(types[static_cast<VoxelType>(i)].colour);
   }
+  if (!types.has_textures()) return;
+  textured_of_.resize(types.size());
+  for (std::size_t i = kAir + 1; i < albedo_.size(); ++i) {
+    const VoxelProperties& type = types[static_cast<VoxelType>(i)];
+    if (type.faces.empty()) continue;
+    Textured& textured = textured_.emplace_back();
+    textured_of_[i] = static_cast<std::uint32_t>(textured_.size());
+    textured.rule = TriplanarRule(type.field_textures);
+    for (const Direction direction : kDirections) {
+      const VoxelFace& face = type.faces[direction];
+      const Vec3 tint(linear_from_srgb(face.tint.r), linear_from_srgb(face.tint.g), linear_from_srgb(face.tint.b));
+      textured.means[static_cast<std::size_t>(direction)] = face.texture.mean() * tint;
+    }
+  }
+}
+
+bool SurfaceMaterials::has_textures(const VertexMaterials& materials) const {
+  return std::ranges::any_of(materials.types, [&](VoxelType type) { return textured(type) != nullptr; });
+}
+
+LinearRgba16 SurfaceMaterials::albedo(const VertexMaterials& materials, const Vec3& normal) const {
+  std::array<float, 4> sum{};
+  for (std::size_t i = 0; i < VertexMaterials::kSlots; ++i) {
+    const auto weight = static_cast<float>(materials.weights[i]);
+    const LinearRgba16 own = albedo(materials.types[i]);
+    const Textured* const look = textured(materials.types[i]);
+    Vec3 colour = Vec3(own[0], own[1], own[2]);
+    if (look != nullptr) {
+      const std::array<float, 3> along = look->rule.weights(normal);
+      colour = Vec3(0.0F);
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto side = static_cast<std::size_t>(2 * axis + (normal[axis] < 0.0F ? 1 : 0));
+        colour += 65'535.0F * along[static_cast<std::size_t>(axis)] * look->means[side];
+      }
+    }
+    for (int k = 0; k < 3; ++k) sum[static_cast<std::size_t>(k)] += weight * colour[k];
+    sum[3] += weight * static_cast<float>(own[3]);
+  }
+  LinearRgba16 mean;
+  for (std::size_t k = 0; k < 4; ++k) {
+    mean[k] = static_cast<std::uint16_t>(std::clamp(sum[k] / 255.0F + 0.5F, 0.0F, 65'535.0F));
+  }
+  return mean;
 }
 
 LinearRgba16 SurfaceMaterials::albedo(VoxelType type) const {
@@ -157,20 +198,87 @@ CellMaterial SurfaceMaterials::blend(std::span<VoxelType> solid) const {
   return blended;
 }
 
-CellMaterial SurfaceMaterials::of_cell(const DensityNeighbourhood& chunks, IVec3 first, int level) const {
+std::span<VoxelType> SurfaceMaterials::find_solid(const DensityNeighbourhood& chunks, IVec3 first, int level,
+                                                  Solid& solid) const {
   QUOIN_ASSERT(level >= 0 && level <= kMaxSmoothLevel, "a level of detail");
   const int size = 1 << level;
-  std::array<VoxelType, kMaxCellSamples> solid;
   std::size_t found = 0;
   const DensityChunk* centre = chunks.centre();
   if (centre != nullptr && std::min({first.x, first.y, first.z}) >= 0 &&
       std::max({first.x, first.y, first.z}) + size < kChunkEdge) {
-    if (const auto only = centre->materials().uniform()) return {albedo(*only), *only};
+    if (const auto only = centre->materials().uniform()) {
+      solid[0] = *only;
+      return {solid.data(), 1};
+    }
     if (level == 0) found = materials_of_corners(*centre, first, solid.data());
   }
   if (found == 0) found = materials_of_cell(AnySolid{chunks}, first, level, solid.data());
-  if (found != 0) return blend({solid.data(), found});
-  return {kWhite, kAir};
+  return {solid.data(), found};
+}
+
+CellMaterial SurfaceMaterials::of_cell(const DensityNeighbourhood& chunks, IVec3 first, int level) const {
+  Solid found;
+  const std::span<VoxelType> solid = find_solid(chunks, first, level, found);
+  if (solid.size() == 1) return {albedo(solid[0]), solid[0]};
+  return solid.empty() ? CellMaterial{kWhite, kAir} : blend(solid);
+}
+
+namespace {
+
+// Returns the four most frequent of some materials, sorted; of equally frequent ones the lowest.
+VertexMaterials mixed_from(std::span<const VoxelType> sorted) {
+  struct Run {
+    VoxelType type;
+    std::uint32_t count;
+  };
+  std::array<Run, VertexMaterials::kSlots> most{};
+  std::size_t kept = 0;
+  for (auto first = sorted.begin(); first != sorted.end();) {
+    const auto end = std::upper_bound(first, sorted.end(), *first);
+    const Run run{*first, static_cast<std::uint32_t>(end - first)};
+    first = end;
+    if (kept < most.size()) {
+      most[kept++] = run;
+      continue;
+    }
+    // The last of the least frequent goes.
+    const auto least = std::min_element(most.rbegin(), most.rend(), [](Run a, Run b) { return a.count < b.count; });
+    if (run.count <= least->count) continue;
+    std::move(least.base(), most.end(), least.base() - 1);
+    most.back() = run;
+  }
+  std::uint32_t total = 0;
+  for (const Run& run : most) total += run.count;
+  VertexMaterials mixed;
+  std::uint32_t sum = 0;
+  std::uint32_t given = 0;
+  for (std::size_t i = 0; i < kept; ++i) {
+    sum += most[i].count;
+    const std::uint32_t until = (sum * 255 + total / 2) / total;
+    mixed.types[i] = most[i].type;
+    mixed.weights[i] = static_cast<std::uint8_t>(until - given);
+    given = until;
+  }
+  return mixed;
+}
+
+}  // namespace
+
+CellMaterial SurfaceMaterials::of_vertex(const DensityNeighbourhood& chunks, IVec3 first, int level, const Vec3& normal,
+                                         VertexMaterials* materials) const {
+  if (materials == nullptr && !has_textures()) return of_cell(chunks, first, level);
+  Solid found;
+  const std::span<VoxelType> solid = find_solid(chunks, first, level, found);
+  if (solid.empty()) {
+    if (materials != nullptr) *materials = only_material(kAir);
+    return {kWhite, kAir};
+  }
+  std::ranges::sort(solid);
+  CellMaterial vertex = blend(solid);
+  const VertexMaterials mixed = mixed_from(solid);
+  if (has_textures(mixed)) vertex.albedo = albedo(mixed, normal);
+  if (materials != nullptr) *materials = mixed;
+  return vertex;
 }
 
 }  // namespace quoin
@@ -303,13 +411,16 @@ TriangleFace face_of_triangle(const SmoothChunkMesh& mesh, const std::uint32_t* 
 }  // namespace
 
 BlockVector<CellMaterial> materials_of(const DensityNeighbourhood& chunks, const SmoothOptions& options,
-                                       const SurfaceMaterials& materials, const SmoothChunkMesh& mesh) {
+                                       const SurfaceMaterials& materials, const SmoothChunkMesh& mesh,
+                                       BlockVector<VertexMaterials>* mixed) {
   const ChunkLevels levels(options.levels);
   BlockVector<CellMaterial> of_vertex;
   of_vertex.reserve(mesh.cells.size());
-  for (const SmoothCell name : mesh.cells) {
-    const LevelCell cell = levels.cell_of(name);
-    of_vertex.push_back(materials.of_cell(chunks, cell.first, cell.level));
+  if (mixed != nullptr) mixed->resize(mesh.cells.size());
+  for (std::size_t i = 0; i < mesh.cells.size(); ++i) {
+    const LevelCell cell = levels.cell_of(mesh.cells[i]);
+    VertexMaterials* const out = mixed != nullptr ? &(*mixed)[i] : nullptr;
+    of_vertex.push_back(materials.of_vertex(chunks, cell.first, cell.level, mesh.normals[i], out));
   }
   return of_vertex;
 }
@@ -317,7 +428,7 @@ BlockVector<CellMaterial> materials_of(const DensityNeighbourhood& chunks, const
 void append_opaque_materials(const DensityNeighbourhood& chunks, const VoxelRegistry& types,
                              const std::array<std::uint8_t, 27>& levels, SmoothCell name, std::vector<VoxelType>& out) {
   const LevelCell cell = ChunkLevels(levels).cell_of(name);
-  std::array<VoxelType, kMaxCellSamples> solid;
+  std::array<VoxelType, 729> solid;  // as many as a cell can have
   const std::size_t found = materials_of_cell(OpaqueSolid{chunks, types}, cell.first, cell.level, solid.data());
   out.insert(out.end(), solid.begin(), solid.begin() + static_cast<std::ptrdiff_t>(found));
 }
@@ -379,6 +490,94 @@ BlockVector<VertexCopy> split_by_faces(std::span<std::uint32_t> indices, std::si
   for (std::uint32_t& index : indices) index = places[index];
   for (const Exception& exception : exceptions) indices[exception.index] += exception.number;
   return list;
+}
+
+namespace {
+
+using Materials = std::array<VoxelType, VertexMaterials::kSlots>;
+
+// The materials of a triangle, in the order of its vertices' slots.
+struct Palette {
+  Materials types{};
+  std::size_t count = 0;
+
+  [[nodiscard]] std::size_t find(VoxelType type) const {
+    return static_cast<std::size_t>(std::find(types.begin(), types.begin() + count, type) - types.begin());
+  }
+  [[nodiscard]] auto key() const { return std::pair(count, types); }
+};
+
+Palette palette_of(const std::array<const VertexMaterials*, 3>& vertices) {
+  struct Sum {
+    VoxelType type = kAir;
+    std::uint32_t weight = 0;
+  };
+  std::array<Sum, 3 * VertexMaterials::kSlots> sums;
+  std::size_t count = 0;
+  for (const VertexMaterials* const vertex : vertices) {
+    for (std::size_t i = 0; i < VertexMaterials::kSlots; ++i) {
+      if (vertex->weights[i] == 0) continue;
+      std::size_t k = 0;
+      while (k < count && sums[k].type != vertex->types[i]) ++k;
+      if (k == count) sums[count++] = {vertex->types[i], 0};
+      sums[k].weight += vertex->weights[i];
+    }
+  }
+  const auto end = sums.begin() + static_cast<std::ptrdiff_t>(count);
+  std::sort(sums.begin(), end,
+            [](Sum a, Sum b) { return a.weight != b.weight ? a.weight > b.weight : a.type < b.type; });
+  Palette palette;
+  palette.count = std::min(count, palette.types.size());
+  std::sort(sums.begin(), sums.begin() + static_cast<std::ptrdiff_t>(palette.count),
+            [](Sum x, Sum y) { return x.type < y.type; });
+  for (std::size_t i = 0; i < palette.count; ++i) palette.types[i] = sums[i].type;
+  return palette;
+}
+
+VertexMaterials in_palette(const VertexMaterials& vertex, const Palette& palette) {
+  VertexMaterials out;
+  out.types = palette.types;
+  std::uint32_t dropped = 0;
+  for (std::size_t i = 0; i < VertexMaterials::kSlots; ++i) {
+    const std::size_t slot = vertex.weights[i] == 0 ? palette.count : palette.find(vertex.types[i]);
+    if (slot < palette.count) {
+      out.weights[slot] = vertex.weights[i];
+    } else {
+      dropped += vertex.weights[i];
+    }
+  }
+  if (dropped != 0) *std::ranges::max_element(out.weights) += static_cast<std::uint8_t>(dropped);
+  return out;
+}
+
+}  // namespace
+
+BlockVector<AlignedVertex> align_materials(std::span<std::uint32_t> indices,
+                                           std::span<const VertexMaterials> materials) {
+  QUOIN_ASSERT(indices.size() % 3 == 0, "three indices per triangle");
+  std::vector<Palette> palettes;
+  std::map<std::pair<std::size_t, Materials>, std::uint32_t> known;
+  std::vector<std::uint32_t> groups;
+  groups.reserve(indices.size() / 3);
+  for (std::size_t i = 0; i < indices.size(); i += 3) {
+    const Palette palette =
+        palette_of({&materials[indices[i]], &materials[indices[i + 1]], &materials[indices[i + 2]]});
+    // Adjacent triangles mostly have the same materials.
+    if (!groups.empty() && palettes[groups.back()].key() == palette.key()) {
+      groups.push_back(groups.back());
+      continue;
+    }
+    const auto [found, is_new] = known.try_emplace(palette.key(), static_cast<std::uint32_t>(palettes.size()));
+    if (is_new) palettes.push_back(palette);
+    groups.push_back(found->second);
+  }
+  const std::vector<TriangleFace> alike(groups.size());
+  BlockVector<AlignedVertex> aligned;
+  for (const VertexCopy& copy :
+       split_by_faces(indices, materials.size(), alike, {.types = false, .directions = false, .groups = groups})) {
+    aligned.push_back({copy.vertex, in_palette(materials[copy.vertex], palettes[copy.look.group])});
+  }
+  return aligned;
 }
 
 }  // namespace quoin::smooth

@@ -30,14 +30,43 @@ class SurfaceMaterials {
   /// surface along its crossed edges, since corners may be far below the surface; if none of its edges is crossed, from
   /// the solid samples of the coarsest lattice within the cell that has any. A cell of air gives air, white.
   [[nodiscard]] CellMaterial of_cell(const DensityNeighbourhood& chunks, IVec3 first, int level) const;
+  /// As `of_cell`, for a vertex with this unit normal: textured materials have the colours of their textures there. Also
+  /// sets `materials` if it is not null.
+  [[nodiscard]] CellMaterial of_vertex(const DensityNeighbourhood& chunks, IVec3 first, int level, const Vec3& normal,
+                                       VertexMaterials* materials) const;
   /// Returns the colour of a type; white if it is not registered.
   [[nodiscard]] LinearRgba16 albedo(VoxelType type) const;
+  /// Returns the mean colour of materials on a surface with this unit normal.
+  [[nodiscard]] LinearRgba16 albedo(const VertexMaterials& materials, const Vec3& normal) const;
+  /// Returns true if any type has textures.
+  [[nodiscard]] bool has_textures() const { return !textured_.empty(); }
+  /// Returns true if any of the materials has textures.
+  [[nodiscard]] bool has_textures(const VertexMaterials& materials) const;
 
  private:
+  // The mean colours of a type's textures, by direction, in linear light.
+  struct Textured {
+    TriplanarRule rule;
+    std::array<Vec3, 6> means{};
+  };
+  // The materials that of_cell blends, unsorted, in `solid`; or only one, of a uniform chunk.
+  using Solid = std::array<VoxelType, 729>;  // as many as a cell can have: along three sides of 9
+  [[nodiscard]] std::span<VoxelType> find_solid(const DensityNeighbourhood& chunks, IVec3 first, int level,
+                                                Solid& solid) const;
   [[nodiscard]] CellMaterial blend(std::span<VoxelType> solid) const;
+  [[nodiscard]] const Textured* textured(VoxelType type) const {
+    return type < textured_of_.size() && textured_of_[type] != 0 ? &textured_[textured_of_[type] - 1] : nullptr;
+  }
 
-  std::vector<LinearRgba16> albedo_;  // by type
+  std::vector<LinearRgba16> albedo_;        // by type
+  std::vector<Textured> textured_;          // of types with textures
+  std::vector<std::uint32_t> textured_of_;  // by type: index into `textured_` plus one, or 0; empty without textures
 };
+
+/// Returns materials with only one.
+[[nodiscard]] constexpr VertexMaterials only_material(VoxelType type) {
+  return {{type, kAir, kAir, kAir}, {255, 0, 0, 0}};
+}
 
 }  // namespace quoin
 
@@ -52,8 +81,10 @@ struct TriangleFace {
 
 /// Returns the blended materials of a chunk's vertices. A vertex of a cell before the chunk has the same material as
 /// in that chunk's mesh.
+/// `mixed`: if not null, gets the materials of each vertex too.
 [[nodiscard]] BlockVector<CellMaterial> materials_of(const DensityNeighbourhood& chunks, const SmoothOptions& options,
-                                                     const SurfaceMaterials& materials, const SmoothChunkMesh& mesh);
+                                                     const SurfaceMaterials& materials, const SmoothChunkMesh& mesh,
+                                                     BlockVector<VertexMaterials>* mixed = nullptr);
 
 /// Appends the materials of the samples that SurfaceMaterials::of_cell would blend for a vertex of an opaque body,
 /// unsorted. `chunks` may contain transparent bodies too, whose samples count as air. `levels`: as
@@ -84,6 +115,16 @@ struct FaceDifferences {
   bool directions = false;
   std::span<const std::uint32_t> groups;  ///< by triangle; empty: all are one
 };
+
+/// A copy of a vertex, for triangles with the same materials.
+struct AlignedVertex {
+  std::uint32_t vertex = 0;
+  VertexMaterials materials;
+};
+
+/// Copies vertices as quoin::align_materials does, and updates `indices`. Returns the copies. `materials`: by vertex.
+BlockVector<AlignedVertex> align_materials(std::span<std::uint32_t> indices,
+                                           std::span<const VertexMaterials> materials);
 
 /// A copy of a vertex, for the triangles with equal attributes.
 struct VertexCopy {

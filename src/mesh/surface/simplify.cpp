@@ -31,7 +31,8 @@ namespace {
 bool has_arrays_of_one_length(const SmoothMesh& mesh) {
   const std::size_t count = mesh.positions.size();
   return mesh.normals.size() == count && mesh.albedo.size() == count && mesh.types.size() == count &&
-         (mesh.occlusion.empty() || mesh.occlusion.size() == count);
+         (mesh.occlusion.empty() || mesh.occlusion.size() == count) &&
+         (mesh.materials.empty() || mesh.materials.size() == count);
 }
 
 bool names_vertices(const SmoothMesh& mesh) {
@@ -422,6 +423,7 @@ void order_for_caches(SmoothMesh& mesh, std::vector<std::uint32_t>& tags) {
   keep_used(mesh.occlusion, place_of, used);
   keep_used(mesh.albedo, place_of, used);
   keep_used(mesh.types, place_of, used);
+  keep_used(mesh.materials, place_of, used);
   keep_used(tags, place_of, used);
 }
 

@@ -90,6 +90,7 @@ struct Part {
   std::vector<Vec3> normals;
   std::vector<float> occlusion;
   std::vector<CellMaterial> materials;
+  BlockVector<VertexMaterials> mixed;  // only if requested
   std::vector<TriangleFace> faces;     // by triangle, in the chunk's coordinates; only if requested
   std::vector<BorderVertex> border;    // sorted by name
   std::vector<SmoothCell> foreign;     // vertices of chunks before this one
@@ -112,7 +113,9 @@ void reserve(const SmoothChunkMesh& mesh, Part& part) {
   part.indices.resize(mesh.indices.size());
 }
 
-Part make_part(const DensityNeighbourhood& chunks, int level, const SurfaceMaterials* materials, Workspace& workspace) {
+// `materials`: null for vertices without colours. `mixes`: with Part::mixed.
+Part make_part(const DensityNeighbourhood& chunks, int level, const SurfaceMaterials* materials, bool mixes,
+               Workspace& workspace) {
   const SmoothChunkMesh& mesh = workspace.mesh;
   QUOIN_ASSERT(mesh.cells.size() == mesh.positions.size() && mesh.normals.size() == mesh.positions.size(),
                "a cell and a normal per vertex");
@@ -133,7 +136,11 @@ Part make_part(const DensityNeighbourhood& chunks, int level, const SurfaceMater
     part.positions.push_back(mesh.positions[i]);
     part.normals.push_back(mesh.normals[i]);
     if (!mesh.occlusion.empty()) part.occlusion.push_back(mesh.occlusion[i]);
-    if (materials != nullptr) part.materials.push_back(materials->of_cell(chunks, cell * (1 << level), level));
+    if (materials != nullptr) {
+      if (mixes) part.mixed.emplace_back();
+      part.materials.push_back(materials->of_vertex(chunks, cell * (1 << level), level, mesh.normals[i],
+                                                    mixes ? &part.mixed.back() : nullptr));
+    }
     if (cell.x == last || cell.y == last || cell.z == last) part.border.push_back({name.bits, place});
   }
   QUOIN_ASSERT(part.positions.size() < Part::kForeign && part.foreign.size() < Part::kForeign, "places of 31 bits");
@@ -187,7 +194,8 @@ class Builder {
     shape_vertices(neighbourhood, options, shape, workspace.mesh);
     // Sharp colours come from the faces.
     const bool is_blended = options_.colours == SurfaceColours::Blended;
-    parts_[i] = make_part(neighbourhood, options.levels[13], is_blended ? &materials : nullptr, workspace);
+    parts_[i] =
+        make_part(neighbourhood, options.levels[13], is_blended ? &materials : nullptr, options_.materials, workspace);
     if (request_.with_faces) find_faces(neighbourhood, options, materials, workspace.mesh, parts_[i].faces);
   }
 
@@ -210,6 +218,7 @@ class Builder {
     if (options_.occlusion.method != SmoothOcclusion::None) mesh.occlusion.resize(vertices);
     mesh.albedo.resize(vertices);
     mesh.types.resize(vertices);
+    if (options_.materials) mesh.materials.resize(vertices);
     mesh.indices.resize(indices);
     if (request_.with_faces) surface.faces.resize(indices / 3);
     parallel_for(chunks_.size(), threads_, [&](std::size_t i) {
@@ -234,6 +243,7 @@ class Builder {
       mesh.types[first + v] = part.materials[v].type;
     }
     std::copy(part.normals.begin(), part.normals.end(), mesh.normals.begin() + first);
+    if (!part.mixed.empty()) std::copy(part.mixed.begin(), part.mixed.end(), mesh.materials.begin() + first);
     std::copy(part.occlusion.begin(), part.occlusion.end(), mesh.occlusion.begin() + first);
   }
 
@@ -318,6 +328,7 @@ std::uint32_t append_vertex(SmoothMesh& to, const SmoothMesh& from, std::size_t 
   if (!from.occlusion.empty()) append(to.occlusion, from.occlusion);
   append(to.albedo, from.albedo);
   append(to.types, from.types);
+  if (!from.materials.empty()) append(to.materials, from.materials);
   return index;
 }
 
@@ -344,6 +355,7 @@ std::vector<std::uint32_t> finish_surface(Surface& surface, const VoxelRegistry&
     if (is_sharp) {
       split.albedo.back() = materials.albedo(copy.look.type);
       split.types.back() = copy.look.type;
+      if (options.materials) split.materials.back() = only_material(copy.look.type);
     }
     if (!groups.empty()) group_of.push_back(copy.look.group);
   }
@@ -352,6 +364,24 @@ std::vector<std::uint32_t> finish_surface(Surface& surface, const VoxelRegistry&
 }
 
 }  // namespace smooth
+
+void align_materials(SmoothMesh& mesh) {
+  if (mesh.materials.empty()) return;
+  QUOIN_ASSERT(mesh.materials.size() == mesh.positions.size(), "materials of each vertex");
+  SmoothMesh aligned;
+  aligned.indices = mesh.indices;
+  const BlockVector<smooth::AlignedVertex> copies = smooth::align_materials(aligned.indices, mesh.materials);
+  aligned.positions.reserve(copies.size());
+  aligned.normals.reserve(copies.size());
+  aligned.albedo.reserve(copies.size());
+  aligned.types.reserve(copies.size());
+  aligned.materials.reserve(copies.size());
+  for (const smooth::AlignedVertex& copy : copies) {
+    smooth::append_vertex(aligned, mesh, copy.vertex);
+    aligned.materials.back() = copy.materials;
+  }
+  mesh = std::move(aligned);
+}
 
 Result<SmoothMesh> build_smooth_mesh(const DensityGrid& field, const VoxelRegistry& types,
                                      const SmoothMeshOptions& options, Threads threads, const Progress& progress) {
