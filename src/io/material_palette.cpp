@@ -49,6 +49,7 @@ std::uint32_t copy_vertex(const MeshView& source, std::size_t from, SmoothMesh& 
   target.albedo.push_back(source.albedo[from]);
   target.types.push_back(source.types[from]);
   if (!source.occlusion.empty()) target.occlusion.push_back(source.occlusion[from]);
+  if (!source.materials.empty()) target.materials.push_back(source.materials[from]);
   if (!source.light.empty()) light.push_back(source.light[from]);
   return static_cast<std::uint32_t>(target.positions.size() - 1);
 }

@@ -96,7 +96,8 @@ const char* find_blocks_error(const MeshView& view, std::size_t types) {
 
 const char* find_smooth_error(const MeshView& view, std::size_t types) {
   const bool has_all = is_one_a_vertex(view.normals, view) && is_one_a_vertex(view.albedo, view) &&
-                       is_none_or_one_a_vertex(view.occlusion, view) && is_none_or_one_a_vertex(view.types, view);
+                       is_none_or_one_a_vertex(view.occlusion, view) && is_none_or_one_a_vertex(view.types, view) &&
+                       is_none_or_one_a_vertex(view.materials, view);
   if (!has_all) return "arrays of different lengths";
   if (!view.types.empty() && largest_of(view.types) >= types) return "an unregistered type";
   if (!all_finite(view.normals)) return "a normal that is not finite";
@@ -303,6 +304,13 @@ VertexTransform::VertexTransform(const glm::dmat4& world_from_part, DVec3 pivot)
     for (int row = 0; row < 3; ++row) largest = std::max(largest, std::abs(normal_matrix_[column][row]));
   }
   normal_matrix_ /= mirrors_ ? -largest : largest;
+}
+
+glm::dmat4 VertexTransform::part_from_position() const {
+  const glm::dmat3 back = glm::inverse(linear_);
+  glm::dmat4 matrix(back);
+  matrix[3] = glm::dvec4(pivot_ - back * translation_, 1.0);
+  return matrix;
 }
 
 double VertexTransform::least_step() const {

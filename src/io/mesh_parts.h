@@ -134,6 +134,8 @@ class VertexTransform {
   [[nodiscard]] DVec3 normal(Vec3 in_part) const;
   /// Returns the normals of a block's six faces, by Direction.
   [[nodiscard]] std::array<Vec3, 6> face_normals() const;
+  /// Returns the inverse, which maps positions back to those of the part.
+  [[nodiscard]] glm::dmat4 part_from_position() const;
   /// Returns true if axis-aligned boxes stay axis-aligned, with each axis mapped to itself.
   [[nodiscard]] bool keeps_axes() const {
     return linear_ == glm::dmat3(linear_[0].x, 0, 0, 0, linear_[1].y, 0, 0, 0, linear_[2].z);

@@ -123,6 +123,10 @@ const char* attribute_name(const GltfPrimitive& primitive, GltfArrayKind kind) {
       return "COLOR_0";
     case GltfArrayKind::Occlusion:
       return "_AO";
+    case GltfArrayKind::Materials:
+      return "_MATERIALS_0";
+    case GltfArrayKind::Weights:
+      return "_WEIGHTS_0";
     case GltfArrayKind::Index:
       break;
   }
@@ -149,6 +153,17 @@ Json primitive_json(const GltfPrimitive& primitive, Arrays& arrays) {
   return {{"attributes", std::move(attributes)}, {"indices", indices}, {"material", primitive.material}};
 }
 
+bool has_materials(const GltfPrimitive& primitive) {
+  return std::ranges::find(primitive.arrays, GltfArrayKind::Materials, &GltfArray::kind) != primitive.arrays.end();
+}
+
+/// In glTF order: column by column.
+Json json_from(const glm::dmat4& matrix) {
+  Json numbers = Json::array();
+  for (int i = 0; i < 16; ++i) numbers.push_back(matrix[i / 4][i % 4] + 0.0);
+  return numbers;
+}
+
 Json meshes_json(const GltfLayout& layout, Arrays& arrays) {
   Json meshes = Json::array();
   for (const GltfMesh& mesh : layout.meshes) {
@@ -157,6 +172,9 @@ Json meshes_json(const GltfLayout& layout, Arrays& arrays) {
     Json entry = Json::object();
     if (!mesh.name.empty()) entry["name"] = mesh.name;
     entry["primitives"] = std::move(primitives);
+    if (std::ranges::any_of(mesh.primitives, has_materials)) {
+      entry["extras"]["voxels_from_mesh"] = json_from(mesh.transform.part_from_position());
+    }
     meshes.push_back(std::move(entry));
   }
   return meshes;
@@ -281,18 +299,21 @@ void add_textures(const GltfLayout& layout, Arrays& arrays, Json& document) {
   // Linear filtering interpolates between the corners of voxels, never across patches. Textures of faces repeat, except
   // in an atlas.
   const int wrap_of_faces = layout.palette.has_face_atlas() ? kClampToEdge : kRepeat;
-  const std::array<std::pair<GltfImageKind, Json>, 3> samplers = {
+  const std::array<std::pair<GltfImageKind, Json>, 4> samplers = {
       {{GltfImageKind::Palette, sampler(kNearest, kNearest, kClampToEdge)},
        {GltfImageKind::Atlas, sampler(kLinear, kLinear, kClampToEdge)},
-       {GltfImageKind::Face, sampler(kNearest, kNearestLinearMipmaps, wrap_of_faces)}}};
+       {GltfImageKind::Face, sampler(kNearest, kNearestLinearMipmaps, wrap_of_faces)},
+       {GltfImageKind::Field, sampler(kNearest, kNearestLinearMipmaps, kRepeat)}}};
   const auto kind_of = [](GltfImageKind kind) {
-    return kind == GltfImageKind::Atlas || kind == GltfImageKind::Face ? kind : GltfImageKind::Palette;
+    const bool is_own = kind == GltfImageKind::Atlas || kind == GltfImageKind::Face || kind == GltfImageKind::Field;
+    return is_own ? kind : GltfImageKind::Palette;
   };
   document["samplers"] = Json::array();
   std::map<GltfImageKind, std::size_t> number_of;
   for (const auto& [kind, sampler_of_kind] : samplers) {
-    const bool is_default =
-        kind == GltfImageKind::Palette && kind_of(layout.images.front().kind) != GltfImageKind::Face;
+    const bool is_default = kind == GltfImageKind::Palette &&
+                            kind_of(layout.images.front().kind) != GltfImageKind::Face &&
+                            kind_of(layout.images.front().kind) != GltfImageKind::Field;
     const auto has_kind = [&](const GltfImage& image) { return kind_of(image.kind) == kind; };
     if (!is_default && std::ranges::none_of(layout.images, has_kind)) continue;
     number_of[kind] = document["samplers"].size();
@@ -306,6 +327,34 @@ void add_textures(const GltfLayout& layout, Arrays& arrays, Json& document) {
   }
   document["textures"] = std::move(textures);
   document["images"] = std::move(images);
+}
+
+/// Returns the materials of smooth vertices, for clients that show their textures: docs/formats/meshes.md.
+Json field_materials_json(const GltfLayout& layout) {
+  Json materials = Json::array();
+  for (const VoxelType number : layout.field_types) {
+    const VoxelProperties& type = layout.palette.types()[number];
+    Json& entry = materials.emplace_back(Json{{"type", number}, {"name", type.name}});
+    if (type.faces.empty()) {
+      entry["color"] = json_from(linear_colour(type.colour));
+      continue;
+    }
+    Json faces = Json::array();
+    for (const Direction direction : kDirections) {
+      const VoxelFace& face = type.faces[direction];
+      const auto texture = std::ranges::find(layout.field_textures, face.texture) - layout.field_textures.begin();
+      QUOIN_ASSERT(texture < std::ssize(layout.field_textures), "a texture of the file");
+      Json& each = faces.emplace_back(Json{{"texture", *layout.texture(GltfImageKind::Field) + texture}});
+      if (face.turn != 0) each["turn"] = face.turn;
+      if (face.mirrored) each["mirrored"] = true;
+      if (const Vec3 tint = linear_colour(face.tint); tint != Vec3(1.0F)) each["tint"] = json_from(tint);
+    }
+    entry["faces"] = std::move(faces);
+    entry["voxels"] = type.field_textures.voxels;
+    entry["flat_degrees"] = type.field_textures.flat_degrees;
+    entry["steep_degrees"] = type.field_textures.steep_degrees;
+  }
+  return materials;
 }
 
 Json node_json(const GltfNode& node) {
@@ -502,6 +551,7 @@ std::string gltf_json(const GltfLayout& layout, std::string_view buffer_uri) {
   add_extensions(layout, document);
   add_nodes(layout, document);
   if (!layout.meshes.empty()) add_meshes(layout, buffer_uri, document);
+  if (!layout.field_types.empty()) document["extras"]["field_materials"] = field_materials_json(layout);
   return document.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

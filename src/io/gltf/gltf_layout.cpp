@@ -11,6 +11,7 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -136,6 +137,10 @@ class ArrayPlan {
           vertices);
     const bool has_occlusion = !view_.block_occlusion.empty() || !view_.occlusion.empty();
     if (is_apart && has_occlusion) add(GltfArrayKind::Occlusion, GltfComponent::Float, 1, vertices);
+    if (!view_.materials.empty() && view_.light.empty()) {
+      add(GltfArrayKind::Materials, GltfComponent::UnsignedShort, 4, vertices);
+      add(GltfArrayKind::Weights, GltfComponent::UnsignedByte, 4, vertices);
+    }
     const bool is_wide = needs_wide_indices(vertices);
     add(GltfArrayKind::Index, is_wide ? GltfComponent::UnsignedInt : GltfComponent::UnsignedShort, 1,
         view_.indices.size());
@@ -154,7 +159,8 @@ class ArrayPlan {
     array.kind = kind;
     array.component = component;
     array.components = components;
-    const bool is_number = kind == GltfArrayKind::Position || kind == GltfArrayKind::Index;
+    const bool is_number =
+        kind == GltfArrayKind::Position || kind == GltfArrayKind::Materials || kind == GltfArrayKind::Index;
     array.normalized = component != GltfComponent::Float && !is_number;
     array.stride = size_of(component) * static_cast<std::uint32_t>(components);
     if (kind != GltfArrayKind::Index) array.stride = (array.stride + 3) / 4 * 4;
@@ -233,6 +239,15 @@ std::vector<std::byte> packed_array(const MaterialPalette& palette, const GltfMe
   return compress_gltf_array(array, bytes);
 }
 
+PngImage png_of(const Texture& texture) {
+  const auto size = static_cast<std::uint32_t>(texture.size());
+  PngImage made{size, size, 4, {}};
+  made.pixels.reserve(4 * texture.level(0).size());
+  for (const Rgba8 texel : texture.level(0))
+    made.pixels.insert(made.pixels.end(), {texel.r, texel.g, texel.b, texel.a});
+  return made;
+}
+
 Status add_image(GltfImageKind kind, std::string name, const PngImage& image, GltfLayout& layout) {
   auto png = encode_png(image);
   if (!png) return png.error();
@@ -246,6 +261,32 @@ Status add_face_images(GltfLayout& layout) {
   for (std::size_t i = 0; i < palette.face_image_count(); ++i) {
     const PngImage image = palette.face_image(i);
     if (Status added = add_image(GltfImageKind::Face, palette.face_image_name(i), image, layout); !added) return added;
+  }
+  return {};
+}
+
+/// Finds the materials that vertices name, and adds an image for each of their textures.
+Status add_field_textures(GltfLayout& layout) {
+  std::set<VoxelType> used;
+  for (const MaterialSurfaces& part : layout.surfaces) {
+    for (const MaterialSurfaces::Surface& surface : part.surfaces()) {
+      if (!surface.view.light.empty()) continue;
+      for (const VertexMaterials& each : surface.view.materials) used.insert(each.types.begin(), each.types.end());
+    }
+  }
+  const VoxelRegistry& types = layout.palette.types();
+  used.erase(kAir);
+  std::erase_if(used, [&](VoxelType type) { return type >= types.size(); });
+  if (std::ranges::none_of(used, [&](VoxelType type) { return !types[type].faces.empty(); })) return {};
+  layout.field_types.assign(used.begin(), used.end());
+  for (const VoxelType type : used) {
+    if (types[type].faces.empty()) continue;
+    for (const Direction direction : kDirections) {
+      const Texture& texture = types[type].faces[direction].texture;
+      if (std::ranges::find(layout.field_textures, texture) != layout.field_textures.end()) continue;
+      layout.field_textures.push_back(texture);
+      if (Status added = add_image(GltfImageKind::Field, texture.name(), png_of(texture), layout); !added) return added;
+    }
   }
   return {};
 }
@@ -528,6 +569,7 @@ Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, const MeshFileOptions
     if (auto added = add_images(meshes.atlas, layout); !added) return added.error();
   }
   if (auto added = add_face_images(layout); !added) return added.error();
+  if (auto added = add_field_textures(layout); !added) return added.error();
   add_channels(meshes, layout);
   std::ranges::copy_if(meshes.lamps, std::back_inserter(layout.lamps), can_light);
   std::ranges::copy_if(meshes.cameras, std::back_inserter(layout.cameras),

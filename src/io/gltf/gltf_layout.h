@@ -32,6 +32,8 @@ enum class GltfArrayKind : std::uint8_t {
   FaceCoordinate,     ///< of textured faces, instead of PaletteCoordinate
   Colour,
   Occlusion,
+  Materials,  ///< VertexMaterials::types
+  Weights,
   Index,
 };
 
@@ -117,7 +119,7 @@ struct GltfChannel {
 };
 
 /// The purpose of a file's image.
-enum class GltfImageKind : std::uint8_t { Palette, MetallicRoughness, Emissive, Atlas, Face };
+enum class GltfImageKind : std::uint8_t { Palette, MetallicRoughness, Emissive, Atlas, Face, Field };
 
 struct GltfImage {
   GltfImageKind kind{};
@@ -131,7 +133,7 @@ struct GltfLayout {
   MaterialPalette palette;
   std::vector<GltfNode> nodes;  ///< the placements in their order, then the groups
   std::vector<GltfMesh> meshes;
-  std::vector<GltfImage> images;           ///< textures of blocks; MaterialPalette::face_image come last
+  std::vector<GltfImage> images;  ///< textures of blocks; MaterialPalette::face_image; `field_textures` come last
   std::vector<MaterialSurfaces> surfaces;  ///< by part
   std::vector<GltfChannel> channels{};     ///< the animation's times and values; after the images
   std::vector<Lamp> lamps{};               ///< lamps that give light; their nodes come after `nodes`
@@ -140,6 +142,10 @@ struct GltfLayout {
   std::uint64_t decoded_bytes = 0;  ///< compressed files: size of the buffer that arrays are decoded into; else 0
 
   bool is_unlit = false;  ///< vertex colours include all light
+  /// The types that vertices of smooth surfaces name as materials, ascending; empty if none has textures. And their
+  /// distinct textures.
+  std::vector<VoxelType> field_types{};
+  std::vector<Texture> field_textures{};
 
   [[nodiscard]] bool is_compressed() const { return decoded_bytes > 0; }
   /// Returns the index of the texture, of faces the first; nullopt if the file has none of that kind.

@@ -240,6 +240,12 @@ void write_gltf_array(const MaterialPalette& palette, const GltfMesh& mesh, cons
     case GltfArrayKind::Occlusion:
       for (std::size_t i = 0; i < view.positions.size(); ++i) out.put(openness_at(view, i));
       return;
+    case GltfArrayKind::Materials:
+      for (const VertexMaterials& each : view.materials) out.put(each.types);
+      return;
+    case GltfArrayKind::Weights:
+      for (const VertexMaterials& each : view.materials) out.put(each.weights);
+      return;
     case GltfArrayKind::Index:
       if (array.component == GltfComponent::UnsignedInt) {
         return write_indices<std::uint32_t>(view, mesh.transform.mirrors(), out);

@@ -439,6 +439,7 @@ void append(SmoothMesh& all, SmoothMesh more) {
   add(all.occlusion, more.occlusion);
   add(all.albedo, more.albedo);
   add(all.types, more.types);
+  add(all.materials, more.materials);
   for (const std::uint32_t index : more.indices) all.indices.push_back(first + index);
 }
 
@@ -456,18 +457,33 @@ MeshPart part_of_bodies(std::string name, SmoothBodies bodies, const DVec3& pivo
 
 namespace {
 
+/// Aligns the materials of a mesh, or drops them if none has textures.
+void keep_textured_materials(const VoxelRegistry& types, SmoothMesh& mesh, MeshStats& stats) {
+  const auto is_textured = [&](VoxelType type) { return type < types.size() && !types[type].faces.empty(); };
+  const auto has_textures = [&](const VertexMaterials& each) { return std::ranges::any_of(each.types, is_textured); };
+  if (std::ranges::none_of(mesh.materials, has_textures)) mesh.materials = {};
+  const std::size_t before = mesh.positions.size();
+  align_materials(mesh);
+  stats.vertices += static_cast<std::int64_t>(mesh.positions.size() - before);
+}
+
 /// The surfaces of a field.
 Result<SmoothBodies> bodies_of_field(const DensityGrid& field, const VoxelRegistry& types, const SurfaceOptions& wanted,
                                      MeshStats& stats, Threads threads, const Progress& progress) {
   const std::vector<std::uint32_t> bodies = smooth::bodies_of(types, field);
   SmoothBodies made;
+  SmoothMeshOptions with_materials = wanted.mesh;
+  with_materials.materials = types.has_textures();
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const auto share = [&](std::size_t k) { return static_cast<double>(k) / static_cast<double>(bodies.size()); };
     const bool is_alone = bodies.size() == 1;
     const DensityGrid own = is_alone ? DensityGrid() : smooth::field_of_body(field, types, bodies[i], threads);
+    const bool is_opaque = bodies[i] == 0;
+    const SurfaceOptions options{is_opaque ? with_materials : wanted.mesh, wanted.simplify_error};
     auto mesh =
-        surface_of(is_alone ? field : own, types, wanted, stats, threads, part_of(progress, share(i), share(i + 1)));
+        surface_of(is_alone ? field : own, types, options, stats, threads, part_of(progress, share(i), share(i + 1)));
     if (!mesh) return mesh.error();
+    if (is_opaque) keep_textured_materials(types, *mesh, stats);
     append(made[bodies[i] == 0 ? 0 : 1], std::move(*mesh));
   }
   return made;
