@@ -76,6 +76,8 @@ struct ChunkSurface {
   std::size_t glass_indices = 0;  ///< number of indices of transparent bodies, which come last
   BlockVector<LinearRgba16> albedo;
   BlockVector<VoxelType> types;
+  /// Fields: the materials of each vertex, aligned (align_materials). Empty if none of them has textures.
+  BlockVector<VertexMaterials> materials;
   /// Result of LiveMeshOptions::convert; null without `convert`.
   std::shared_ptr<const void> converted;
   std::size_t converted_bytes = 0;  ///< ConvertedSurface::bytes; 0: unknown

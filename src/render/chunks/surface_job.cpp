@@ -321,6 +321,25 @@ void append(const SmoothChunkMesh& from, SmoothChunkMesh& to) {
   for (std::size_t i = begin; i < to.indices.size(); ++i) to.indices[i] += first;
 }
 
+// Replaces the mesh's vertices by copies, and keeps its indices. `vertex_of(copy)` is the vertex that it copies.
+template <class Copies, class VertexOf>
+void copy_vertices(const Copies& copies, const VertexOf& vertex_of, SmoothChunkMesh& mesh) {
+  SmoothChunkMesh split;
+  split.positions.resize(copies.size());
+  split.normals.resize(copies.size());
+  if (!mesh.occlusion.empty()) split.occlusion.resize(copies.size());
+  split.cells.resize(copies.size());
+  for (std::size_t i = 0; i < copies.size(); ++i) {
+    const std::uint32_t vertex = vertex_of(copies[i]);
+    split.positions[i] = mesh.positions[vertex];
+    split.normals[i] = mesh.normals[vertex];
+    if (!mesh.occlusion.empty()) split.occlusion[i] = mesh.occlusion[vertex];
+    split.cells[i] = mesh.cells[vertex];
+  }
+  std::swap(split.indices, mesh.indices);
+  mesh = std::move(split);
+}
+
 // Gives each face the colour of its sample.
 void append_by_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options,
                      const SurfaceMaterials& materials, SmoothChunkMesh& mesh, ChunkSurface& surface) {
@@ -329,25 +348,42 @@ void append_by_faces(const DensityNeighbourhood& chunks, const SmoothOptions& op
   const BlockVector<smooth::VertexCopy> copies =
       smooth::split_by_faces({mesh.indices.begin(), mesh.indices.end()}, mesh.positions.size(), faces,
                              {.types = true, .directions = false, .groups = {}});
-  SmoothChunkMesh split;
-  split.positions.resize(copies.size());
-  split.normals.resize(copies.size());
-  if (!mesh.occlusion.empty()) split.occlusion.resize(copies.size());
-  split.cells.resize(copies.size());
   surface.albedo.reserve(surface.albedo.size() + copies.size());
   surface.types.reserve(surface.types.size() + copies.size());
-  for (std::size_t i = 0; i < copies.size(); ++i) {
-    const std::uint32_t vertex = copies[i].vertex;
-    split.positions[i] = mesh.positions[vertex];
-    split.normals[i] = mesh.normals[vertex];
-    if (!mesh.occlusion.empty()) split.occlusion[i] = mesh.occlusion[vertex];
-    split.cells[i] = mesh.cells[vertex];
-    surface.albedo.push_back(materials.albedo(copies[i].look.type));
-    surface.types.push_back(copies[i].look.type);
+  for (const smooth::VertexCopy& copy : copies) {
+    surface.albedo.push_back(materials.albedo(copy.look.type));
+    surface.types.push_back(copy.look.type);
   }
-  std::swap(split.indices, mesh.indices);
-  append(split, surface.smooth);
-  std::swap(split.indices, mesh.indices);
+  copy_vertices(
+      copies, [](const smooth::VertexCopy& copy) { return copy.vertex; }, mesh);
+  append(mesh, surface.smooth);
+}
+
+// Aligns the vertices' materials if any of them has textures; the other vertices of the surface have one material.
+void append_with_textures(const SurfaceMaterials& materials, const BlockVector<CellMaterial>& of_vertex,
+                          const BlockVector<VertexMaterials>& mixed, SmoothChunkMesh& mesh, ChunkSurface& surface) {
+  const bool has_textures = std::any_of(mixed.begin(), mixed.end(),
+                                        [&](const VertexMaterials& each) { return materials.has_textures(each); });
+  if (!has_textures && surface.materials.empty()) {
+    for (const CellMaterial& material : of_vertex) {
+      surface.albedo.push_back(material.albedo);
+      surface.types.push_back(material.type);
+    }
+    return append(mesh, surface.smooth);
+  }
+  for (std::size_t i = surface.materials.size(); i < surface.types.size(); ++i) {
+    surface.materials.push_back(only_material(surface.types[i]));
+  }
+  const BlockVector<smooth::AlignedVertex> copies =
+      smooth::align_materials({mesh.indices.begin(), mesh.indices.end()}, mixed);
+  for (const smooth::AlignedVertex& copy : copies) {
+    surface.albedo.push_back(of_vertex[copy.vertex].albedo);
+    surface.types.push_back(of_vertex[copy.vertex].type);
+    surface.materials.push_back(copy.materials);
+  }
+  copy_vertices(
+      copies, [](const smooth::AlignedVertex& copy) { return copy.vertex; }, mesh);
+  append(mesh, surface.smooth);
 }
 
 bool reads_as_before(const SurfaceJob& job, int reach) {
@@ -398,11 +434,11 @@ void mesh_body(const ChunkSurfaceOptions& options, const DensityNeighbourhood& c
     append_by_faces(chunks, wanted, *job.materials, workspace.mesh, surface);
     return;
   }
-  for (const CellMaterial& material : smooth::materials_of(chunks, wanted, *job.materials, workspace.mesh)) {
-    surface.albedo.push_back(material.albedo);
-    surface.types.push_back(material.type);
-  }
-  append(workspace.mesh, surface.smooth);
+  BlockVector<VertexMaterials> mixed;
+  const bool has_textures = !is_of_voxels && job.materials->has_textures();
+  const BlockVector<CellMaterial> of_vertex =
+      smooth::materials_of(chunks, wanted, *job.materials, workspace.mesh, has_textures ? &mixed : nullptr);
+  append_with_textures(*job.materials, of_vertex, mixed, workspace.mesh, surface);
 }
 
 void finish(std::shared_ptr<ChunkSurface> surface, SurfaceJob& job) {
@@ -410,6 +446,8 @@ void finish(std::shared_ptr<ChunkSurface> surface, SurfaceJob& job) {
   QUOIN_ASSERT(surface->albedo.size() == surface->smooth.positions.size() &&
                    surface->types.size() == surface->smooth.positions.size(),
                "a colour and a type for each vertex");
+  QUOIN_ASSERT(surface->materials.empty() || surface->materials.size() == surface->smooth.positions.size(),
+               "materials of each vertex, or of none");
   QUOIN_ASSERT(surface->glass_indices <= surface->smooth.indices.size(), "indices of the surface");
   surface->style = SurfaceStyle::Smooth;
   surface->level = job.levels[13];
@@ -560,9 +598,10 @@ std::size_t ChunkSurface::bytes() const {
          smooth.normals.capacity() * sizeof(Vec3) + smooth.occlusion.capacity() * sizeof(float) +
          smooth.cells.capacity() * sizeof(SmoothCell) + smooth.indices.capacity() * sizeof(std::uint32_t) +
          albedo.capacity() * sizeof(LinearRgba16) + types.capacity() * sizeof(VoxelType) +
-         regions.capacity() * sizeof(SurfaceRegion) + light.capacity() * sizeof(FaceLight) +
-         shapes.capacity() * sizeof(ShapeFace) + shape_light.capacity() * sizeof(FaceLight) +
-         region_shapes.capacity() * sizeof(RegionShapes) + shapes_of_types.capacity() * sizeof(VoxelShapes);
+         materials.capacity() * sizeof(VertexMaterials) + regions.capacity() * sizeof(SurfaceRegion) +
+         light.capacity() * sizeof(FaceLight) + shapes.capacity() * sizeof(ShapeFace) +
+         shape_light.capacity() * sizeof(FaceLight) + region_shapes.capacity() * sizeof(RegionShapes) +
+         shapes_of_types.capacity() * sizeof(VoxelShapes);
 }
 
 }  // namespace quoin

@@ -25,7 +25,7 @@ struct MeshInstance {
   float first_sample;  // position of sample 0 of a smooth mesh in voxel 0: 0.5, the voxel's centre; 0 for fields
   vec2 far_steps;   // of an impostor: the width of the bits of its level's cells, and of the coarser level's
   uvec4 far_cells;  // addresses of both levels' cells
-  uvec4 far_near;   // as in Far
+  uvec4 far_near;   // as in Far; of a field: the origin of its tree's coordinates in the grid, and its halvings
   vec4 far_centre;  // of the content, in the tree's coordinates
 };
 
@@ -59,7 +59,8 @@ layout(push_constant) uniform Push {
   uvec2 far_faces;  // of an impostor
   float room;       // of the instance; the sky's: converts the distance from the image's centre to the tangent of an
                     // angle
-  uint numbers;     // bits 0-3: draw mode; for an impostor 4-27: share of pixels that use the coarser level, 28: 1 if
+  uint numbers;     // bits 0-3: draw mode; from 4 on for a smooth mesh: its vertices if it has materials, else 0; for an
+                    // impostor 4-27: share of pixels that use the coarser level, 28: 1 if
                     // this is that level, 29: 1 if it has cells
 } push;
 

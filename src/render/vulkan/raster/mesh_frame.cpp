@@ -195,13 +195,22 @@ ShaderMeshInstance shader_instance(const Space& space, const View& view, const E
     out.diffuse[static_cast<std::size_t>(i / 4)][i % 4] = static_cast<float>(std::max(cosine, 0.0) * brightness);
   }
   out.home = IVec4(IVec3(space.base) - instance.origin, instance.placed);
-  if (instance.mesh.content == SurfaceContent::Field) out.first_sample = 0.0F;
+  const bool is_of_field = instance.mesh.content == SurfaceContent::Field;
+  if (is_of_field) {
+    out.first_sample = 0.0F;
+    const IVec3 origin = instance.placed < 0 ? IVec3(0) : instance.origin;
+    for (int axis = 0; axis < 3; ++axis) {
+      out.far_near.at(static_cast<std::size_t>(axis)) = static_cast<std::uint32_t>(origin[axis]);
+    }
+    out.far_near[3] = static_cast<std::uint32_t>(instance.mesh.level);
+  }
   out.eye = to_vec4(space.eye, view.rays.is_perspective() ? 1.0 : 0.0);
   const double depth_per_w = view.rays.is_perspective() ? view.nearest : 1.0;
   const double pixel = glm::length(view.rays.right());
   constexpr float kMeanOfFace = 1e15F;
   const double spacing = glm::length(view.rays.down()) / (view.rays.is_perspective() ? 1.0 : instance.voxel_size);
-  out.axes[0].w = instance.shows_means ? kMeanOfFace : static_cast<float>(spacing);
+  // Halved fields show textures in their own size.
+  out.axes[0].w = instance.shows_means && !is_of_field ? kMeanOfFace : static_cast<float>(spacing);
   out.room = static_cast<float>(depth_per_w * kWidening * pixel / instance.voxel_size / subpixels);
   return out;
 }

@@ -330,13 +330,15 @@ Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples,
     // Edges are as bright as their surface, but without shadows.
     const bool is_lit = step.over != Step::Over::Sky && (step.mode == kDrawSurfaces || is_channel_of_glass(step.mode));
     const bool is_coloured = data.has_textures && step.mode == kDrawSurfaces && step.over != Step::Over::Sky;
+    const auto has_materials = [](const MeshDraw& draw) { return draw.mesh->with_materials != 0; };
+    const bool is_coloured_smooth = is_coloured && std::ranges::any_of(data.draws, has_materials);
     MeshLight lit = is_lit ? light : MeshLight::Plain;
     if (is_nearest_glass(step.mode)) lit = data.glass_by_rays ? MeshLight::TracedThroughGlass : light;
     const auto find = [&](MeshWay::What what, bool mirrored, VkPipeline& out) -> Status {
-      const auto found = pipelines_->pipeline({what, step.mode, mirrored, step.over == Step::Over::GlassInOrder, lit,
-                                               data.glass_by_rays && is_nearest_glass(step.mode),
-                                               lit != MeshLight::Plain && data.has_fields,
-                                               is_coloured && what != MeshWay::What::Smooth, samples});
+      const auto found = pipelines_->pipeline(
+          {what, step.mode, mirrored, step.over == Step::Over::GlassInOrder, lit,
+           data.glass_by_rays && is_nearest_glass(step.mode), lit != MeshLight::Plain && data.has_fields,
+           what == MeshWay::What::Smooth ? is_coloured_smooth : is_coloured, samples});
       if (!found) return found.error();
       out = *found;
       return {};
@@ -450,6 +452,7 @@ void MeshPass::draw_chunks(VkCommandBuffer commands, const MeshFrameData& data, 
     values.clip = instance.clip;
     values.eye = instance.eye;
     values.room = instance.room;
+    values.numbers = data.push.numbers | step.mode | draw.mesh->with_materials << kMeshVerticesShift;
     push(commands, values);
     draw_mesh(commands, draw, step);
   }

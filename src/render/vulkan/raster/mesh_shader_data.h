@@ -61,6 +61,8 @@ constexpr std::uint32_t kDrawGlassAdded = 9;
   return mode >= kDrawGlassDepth && mode <= kDrawGlassAdded;
 }
 // and for an impostor the share of pixels, of 2^24, that show the coarser level, and a bit set if this is that level.
+// For a smooth mesh with materials, its number of vertices, which the materials follow.
+constexpr int kMeshVerticesShift = 4;
 constexpr int kMeshShareShift = 4;
 constexpr std::uint32_t kMeshIsCoarser = std::uint32_t{1} << 28;
 constexpr std::uint32_t kMeshHasCells = std::uint32_t{1} << 29;

@@ -8,6 +8,7 @@
 #include <quoin/core/assert.h>
 
 #include "core/caches.h"
+#include "render/vulkan/raster/mesh_shader_data.h"
 #include "render/vulkan/trees/shader_data.h"
 #include "scene/tracer/placed_grid.h"
 
@@ -30,6 +31,14 @@ void append_vertex(const ChunkSurface& surface, std::size_t i, std::vector<std::
   words.push_back(surface.types[i]);
 }
 
+void append_materials(const VertexMaterials& materials, std::vector<std::uint32_t>& words) {
+  const auto& [types, weights] = materials;
+  words.push_back(types[0] | std::uint32_t{types[1]} << 16);
+  words.push_back(types[2] | std::uint32_t{types[3]} << 16);
+  words.push_back(weights[0] | std::uint32_t{weights[1]} << 8 | std::uint32_t{weights[2]} << 16 |
+                  std::uint32_t{weights[3]} << 24);
+}
+
 // Rejects indices and sizes that would make a device read outside the surface's memory.
 Status check(const ChunkSurface& surface) {
   const auto refuse = [](const char* message) { return make_error(ErrorCode::InvalidArgument, message); };
@@ -40,7 +49,8 @@ Status check(const ChunkSurface& surface) {
   const SmoothChunkMesh& mesh = surface.smooth;
   const std::size_t count = mesh.positions.size();
   const bool is_whole = mesh.normals.size() == count && surface.albedo.size() == count &&
-                        surface.types.size() == count && (mesh.occlusion.empty() || mesh.occlusion.size() == count);
+                        surface.types.size() == count && (mesh.occlusion.empty() || mesh.occlusion.size() == count) &&
+                        (surface.materials.empty() || surface.materials.size() == count);
   if (!is_whole) return refuse("surface: its vertex arrays have different lengths");
   const bool is_of_triangles = mesh.indices.size() % 3 == 0 && surface.glass_indices % 3 == 0;
   if (!is_of_triangles) return refuse("surface: its index counts are not multiples of 3");
@@ -128,9 +138,13 @@ Status MeshStore::upload(const ChunkSurface& surface, StoredMesh& mesh) {
     const SmoothChunkMesh& smooth = surface.smooth;
     mesh.indices = static_cast<std::uint32_t>(smooth.indices.size());
     mesh.glass_indices = static_cast<std::uint32_t>(surface.glass_indices);
-    words.reserve(kVertexWords * smooth.positions.size() + smooth.indices.size());
+    const std::size_t count = smooth.positions.size();
+    words.reserve(kVertexWords * count + kMaterialWords * surface.materials.size() + smooth.indices.size());
     if (mesh.indices != 0) {
-      for (std::size_t i = 0; i < smooth.positions.size(); ++i) append_vertex(surface, i, words);
+      for (std::size_t i = 0; i < count; ++i) append_vertex(surface, i, words);
+      for (const VertexMaterials& each : surface.materials) append_materials(each, words);
+      mesh.with_materials = static_cast<std::uint32_t>(surface.materials.size());
+      QUOIN_ASSERT(surface.materials.size() < std::size_t{1} << (32 - kMeshVerticesShift), "a number of 28 bits");
     }
     mesh.first_index = words.size() * sizeof(std::uint32_t);
     words.insert(words.end(), smooth.indices.begin(), smooth.indices.end());

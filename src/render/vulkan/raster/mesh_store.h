@@ -29,7 +29,8 @@ struct StoredMesh {
   std::uint32_t indices = 0;
   std::uint32_t glass_indices = 0;
   VkDeviceSize first_index = 0;
-  std::vector<Quad> glass;  ///< the transparent quads, to be sorted for each image
+  std::uint32_t with_materials = 0;  ///< number of vertices that materials follow; 0: without materials
+  std::vector<Quad> glass;           ///< the transparent quads, to be sorted for each image
 
   [[nodiscard]] std::int64_t triangles() const {
     return std::int64_t{2} * opaque.back() + 2 * static_cast<std::int64_t>(glass.size()) + indices / 3;
@@ -48,10 +49,12 @@ struct MeshKey {
   }
 };
 
-/// Surfaces of chunks in device memory: 8 bytes per quad, or 28 per vertex and 4 per index.
+/// Surfaces of chunks in device memory: 8 bytes per quad, or 28 per vertex and 4 per index. Vertices of textured fields
+/// have 12 bytes more.
 class MeshStore {
  public:
   static constexpr std::size_t kVertexWords = 7;
+  static constexpr std::size_t kMaterialWords = 3;  ///< per vertex, after all vertices
 
   struct ByPlace {
     bool operator()(IVec3 a, IVec3 b) const { return a.z != b.z ? a.z < b.z : a.y != b.y ? a.y < b.y : a.x < b.x; }

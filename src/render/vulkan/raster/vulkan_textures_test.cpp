@@ -1,6 +1,8 @@
 // Marched and rasterised images show the textures of types as the CPU renderer does.
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -81,6 +83,28 @@ class VulkanTextures : public vulkan_test::VulkanMeshTest {
   /// Returns the number of textures in device memory.
   [[nodiscard]] std::size_t texel_count() const { return renderer_->impl().texels.size(); }
 };
+
+/// Hills of four materials that blend: two textures of other sizes and slopes, an emissive one, and one without textures.
+DensityGrid add_hills(Scene& scene, float edge) {
+  std::array<VoxelType, 4> types{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    VoxelProperties material;
+    material.faces = random_faces(static_cast<unsigned>(40 + 7 * i));
+    material.emission = i == 2 ? 0.4F : 0.0F;
+    material.field_textures = {.voxels = edge * static_cast<float>(1 + i),
+                               .flat_degrees = 10.0F + 10.0F * static_cast<float>(i),
+                               .steep_degrees = 60.0F};
+    types[i] = scene.types.add(material).value();
+  }
+  types[3] = add_type(scene, {90, 160, 210});
+  DensityGrid field;
+  field.edit({{-20, -12, -20}, {20, 12, 20}}, [&](IVec3 p, DensitySample) {
+    const double height = 5.0 * std::sin(0.25 * p.x) * std::cos(0.3 * p.z);
+    const auto type = types.at(static_cast<std::size_t>((p.x >= 0 ? 1 : 0) + (p.z >= p.y ? 2 : 0)));
+    return DensitySample{static_cast<float>(0.7 * (p.y - height)), type};
+  });
+  return field;
+}
 
 TEST_F(VulkanTextures, NearAndDistantTexelsMatchCpu) {
   Scene scene;
@@ -199,6 +223,120 @@ TEST_F(VulkanTextures, TexelsBehindGlassMatchCpu) {
   const VoxelType glass = add_type(scene, {120, 200, 230, 90}, Visibility::Transparent);
   scene.edit(blocks.grid).grid.fill_box({{-2, 0, 5}, {6, 6, 6}}, glass);
   compare_marched(scene, towards({9, 8, 14}, {0, 1, 0}), sized(96, 72), "glass");
+}
+
+TEST_F(VulkanTextures, FieldsMatchCpu) {
+  Scene scene;
+  SceneGrid hills;
+  hills.field = add_hills(scene, 2.75F);
+  hills.pivot = {0.25, 0.5, 0.0};
+  const GridHandle grid = scene.add_grid(std::move(hills));
+  scene.add_instance({"", grid, DVec3(0.0)});
+  add_turned(scene, grid, {-8.0, 22.0, 5.0});
+  const Camera camera = towards({22, 18, 26}, {0, 2, 0});
+  RenderOptions options = sized(160, 120);
+  compare_marched(scene, camera, options, "field");
+  compare_marched(scene, from_above(0.31, 30, -0.43, 25.7), options, "field_flat");
+  compare_marched(scene, towards({150, 120, 190}, {0, 5, 0}, 0.2), options, "field_distant");
+  options.samples = 4;
+  options.light.shading = Shading::Unlit;
+  compare_marched(scene, camera, options, "field_samples");
+  // Slopes and edges are followed without a change of textures.
+  const RenderedImage before = render_test::taken(scene, camera, options);
+  for (VoxelType type = 1; type < scene.types.size(); ++type) {
+    VoxelProperties changed = scene.types[type];
+    changed.field_textures = {.voxels = 0.375F, .flat_degrees = 0.0F, .steep_degrees = 0.001F};
+    scene.types.replace(type, changed);
+  }
+  compare_marched(scene, camera, options, "field_edited");
+  EXPECT_GT(render_test::count_different(before, render_test::taken(scene, camera, options), 8), 500);
+}
+
+// Halved fields and impostors keep the size and the position of textures.
+TEST_F(VulkanTextures, DetailOfFieldsMatchesCpu) {
+  Scene scene;
+  SceneGrid hills;
+  hills.field = add_hills(scene, 24.5F);
+  scene.add_instance({"", scene.add_grid(std::move(hills))});
+  const Camera camera = towards({60, 45, 80}, {0, 0, 0}, 0.6);
+  RenderOptions options = sized(128, 96);
+  options.detail.policy = DetailPolicy{.far_pixels = 0};
+  options.detail.policy->cell_pixels = 12;
+  compare_marched(scene, camera, options, "field_halved");
+  options.detail.policy = DetailPolicy{.far_pixels = 1000};
+  compare_marched(scene, camera, options, "field_impostor");
+}
+
+TEST_F(VulkanTextures, FieldsFarFromOriginMatchCpu) {
+  const DVec3 far{3e8, -2e5, 7e7};
+  Scene scene;
+  const DensityGrid near = add_hills(scene, 3.7F);
+  SceneGrid hills;
+  const IVec3 shift{300'000'000, -200'000, 70'000'000};
+  hills.field.edit({shift - IVec3{20, 12, 20}, shift + IVec3{20, 12, 20}},
+                   [&](IVec3 p, DensitySample) { return near.get(p - shift); });
+  scene.add_instance({"", scene.add_grid(std::move(hills)), DVec3(0.0)});
+  compare_marched(scene, towards(far + DVec3(22, 18, 26), far), sized(128, 96), "field_far");
+}
+
+// Meshes blend materials by the weights of vertices, which on flat ground are the shares of samples where these change
+// along one axis only.
+TEST_F(VulkanTextures, MeshesOfFlatFieldsMatchCpu) {
+  Scene scene;
+  (void)add_hills(scene, 2.75F);
+  SceneGrid ground;
+  ground.field.edit({{-40, -8, -40}, {40, 2, 40}}, [&](IVec3 p, DensitySample) {
+    return DensitySample{static_cast<float>(p.y), static_cast<VoxelType>(1 + std::clamp(p.x / 4 + 2, 0, 3))};
+  });
+  const GridHandle grid = scene.add_grid(std::move(ground));
+  scene.add_instance({"", grid, {0.25, 0.5, 0.0}});
+  put(scene, vulkan_test::live_surfaces(scene, SurfaceStyle::Blocky));
+  RenderOptions options = sized(160, 120);
+  options.light.shading = Shading::Unlit;
+  const auto compare_mesh = [&](const Camera& camera, const std::string& name) {
+    expect_like(drawn(camera, mesh_options(options)), render_test::taken(scene, camera, options), name);
+  };
+  const Camera near = towards({4, 12, 7}, {0, 0, 0}, 0.7);
+  compare_mesh(near, "field_near");
+  compare_mesh(from_above(0.31, 30, -0.43, 25.7), "field_flat");
+  compare_mesh(towards({40, 70, 60}, {0, 0, 0}, 0.2), "field_distant");
+  options.light.shading = Shading::Lit;
+  options.light.occlusion_mode = OcclusionMode::Off;
+  compare_mesh(near, "field_lit");
+  options.detail.colours = true;
+  options.detail.policy = DetailPolicy{.far_pixels = 0};
+  compare_mesh(near, "field_detail_colours");
+}
+
+// On slopes the normals and weights of meshes differ a little from those of rays. Chunks of all levels, and halved
+// fields, show textures in one size.
+TEST_F(VulkanTextures, MeshesOfHillsResembleCpu) {
+  Scene scene;
+  SceneGrid hills;
+  hills.field = add_hills(scene, 5.5F);
+  scene.add_instance({"", scene.add_grid(std::move(hills))});
+  RenderOptions options = sized(160, 120);
+  options.light.shading = Shading::Unlit;
+  const Camera camera = towards({22, 18, 26}, {0, 2, 0});
+  const Image expected = render_test::taken(scene, camera, options).colour;
+  const auto differing = [&](const std::vector<SurfaceUpdate>& surfaces) {
+    meshes_->clear();
+    put(scene, surfaces);
+    return vulkan_test::bytes_that_differ(drawn(camera, mesh_options(options)), expected, 40);
+  };
+  const int all = 160 * 120 * 3;
+  EXPECT_LT(differing(vulkan_test::live_surfaces(scene, SurfaceStyle::Blocky)) * 20, all);
+  // Meshes without materials show means.
+  const VoxelRegistry types = scene.types;
+  for (VoxelType type = 1; type < types.size(); ++type) {
+    VoxelProperties plain = types[type];
+    plain.faces = {};
+    scene.types.replace(type, plain);
+  }
+  const std::vector<SurfaceUpdate> plain = vulkan_test::live_surfaces(scene, SurfaceStyle::Blocky);
+  for (const SurfaceUpdate& each : plain) EXPECT_TRUE(each.surface == nullptr || each.surface->materials.empty());
+  for (VoxelType type = 1; type < types.size(); ++type) scene.types.replace(type, types[type]);
+  EXPECT_GT(differing(plain) * 8, all);
 }
 
 // Renderers and their mesh renderers share the texels in device memory.
