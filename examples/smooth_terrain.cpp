@@ -1,6 +1,8 @@
-// Meshes smooth terrain with coarser far chunks as one closed mesh with occlusion. Writes smooth_terrain.glb.
+// Meshes smooth terrain with coarser far chunks as one closed mesh with occlusion. Grass, earth, stone, sand and snow have
+// textures, which blend by the weights of vertices. Writes smooth_terrain.glb.
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
 
 #include <quoin/io/mesh_file.h>
@@ -14,12 +16,35 @@ int fail(const quoin::Error& error) {
   return 1;
 }
 
+// Gives a type a speckled texture of its colour, 8 voxels wide. Programs usually read images from files.
+quoin::Status add_texture(quoin::VoxelType type, quoin::VoxelRegistry& registry) {
+  quoin::VoxelProperties properties = registry[type];
+  const quoin::Rgba8 colour = properties.colour;
+  quoin::AlphaImage image{16, 16, {}};
+  for (int i = 0; i < 16 * 16; ++i) {
+    const int shade = 160 + (i * i * 31 + i * 17) % 96;
+    for (const int channel : {colour.r, colour.g, colour.b}) {
+      image.rgba.push_back(static_cast<std::uint8_t>(channel * shade / 255));
+    }
+    image.rgba.push_back(255);
+  }
+  const auto texture = quoin::Texture::from_image(properties.name, image);
+  if (!texture) return texture.error();
+  properties.faces = *texture;
+  properties.field_textures.voxels = 8.0F;
+  registry.replace(type, properties);
+  return {};
+}
+
 }  // namespace
 
 int main() {
   quoin::VoxelRegistry registry;
   const auto types = quoin::add_terrain_types(registry);
   if (!types) return fail(types.error());
+  for (const quoin::VoxelType type : {types->grass, types->earth, types->stone, types->sand, types->snow}) {
+    if (const quoin::Status done = add_texture(type, registry); !done) return fail(done.error());
+  }
   quoin::SmoothTerrainOptions terrain;
   terrain.seed = 7;
   terrain.size = {5, 2, 5};
@@ -31,9 +56,12 @@ int main() {
   options.level_of = [](quoin::IVec3 chunk) {
     return std::clamp(std::max(chunk.x, chunk.z) - 1, 0, quoin::kMaxSmoothLevel);
   };
+  options.materials = true;
   auto mesh = quoin::build_smooth_mesh(*field, registry, options);
   if (!mesh) return fail(mesh.error());
+  quoin::align_materials(*mesh);
   quoin::SceneMeshes meshes;
+  meshes.types = registry;
   meshes.parts = {{"terrain", {quoin::view_of(*mesh)}}};
   meshes.placements = {{}};
   const auto bytes = quoin::write_mesh(meshes, "smooth_terrain.glb");
