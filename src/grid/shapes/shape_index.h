@@ -98,6 +98,11 @@ class ShapeIndex {
       }
     }
   }
+  // Returns the content of a chunk, which is replaced when its shapes change; null if there is none.
+  [[nodiscard]] std::shared_ptr<const void> content(IVec3 chunk) const {
+    const auto found = chunks_.find(chunk);
+    return found == chunks_.end() ? nullptr : found->second;
+  }
   // Returns the smallest box around the voxels that shapes touch.
   [[nodiscard]] IBox bounds() const;
   [[nodiscard]] std::size_t bytes() const;

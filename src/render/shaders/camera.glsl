@@ -187,3 +187,14 @@ vec3 exact_place(Placed placed, Pair d, ivec3 voxel, uint face) {
   Pair start = start_from(ray, placed, voxel);
   return sum_of(start, product_of(distance_to_face(ray, start, face), ray.direction)).high;
 }
+
+// Returns the point where a ray meets a side of a voxel's shape, relative to the voxel's lower corner. `t`: its
+// distance from the instance's start, which may be rounded.
+vec3 exact_place_on_shape(Placed placed, Pair d, ivec3 voxel, uint side, float t) {
+  ExactRay ray = exact_ray_in(placed, d);
+  Pair start = start_from(ray, placed, voxel);
+  vec3 near = sum_of(start, product_of(Pair(vec3(t), vec3(0.0)), ray.direction)).high;
+  vec4 plane = shape_vector(side_index(side));
+  float rest = (plane.w - dot(plane.xyz, near)) / dot(plane.xyz, ray.direction.high);
+  return near + rest * ray.direction.high;
+}

@@ -6,9 +6,11 @@
 layout(constant_id = 4) const bool kHasFields = false;
 // True if any field has a transparent part.
 layout(constant_id = 6) const bool kHasFieldGlass = false;
-// The trees of a grid: its voxels, then its field.
-const int kContents = kHasFields ? 2 : 1;
-const int kGlassContents = kHasFieldGlass ? 2 : 1;
+// True if any grid has shapes (VoxelShapes).
+layout(constant_id = 8) const bool kHasShapes = false;
+// The trees of a grid: its voxels, then its field, then the voxels that shapes touch.
+const int kContents = kHasShapes ? 3 : kHasFields ? 2 : 1;
+const int kGlassContents = kHasShapes ? 3 : kHasFieldGlass ? 2 : 1;
 
 const uint kPerspective = 1;
 const uint kLit = 2;
@@ -84,11 +86,14 @@ struct Point {
   uvec4 what;   // type, face, kind; w: as a float, the distance from the start of the instance's ray
 };
 // For a field, the kind includes kIsField, and the face is a normal in the form of `packed_normal`. For an impostor,
-// the kind is kSurface | kIsFar, with the corner occlusion and open rays of its face from bit 8 on.
+// the kind is kSurface | kIsFar, with the corner occlusion and open rays of its face from bit 8 on. For a side of a
+// shape, the kind includes kIsShape, the voxel is the one that has the shape, and the face is one of shapes.glsl.
 
 // A run of transparent voxels, or of a field's transparent part, of one type. w of `voxel`: the instance. `lengths`:
 // entry t and exit t, voxels, and entry t from the start of the instance's ray. `what`: type, face, flags of its ends,
 // and the exit: 8 times the instance, plus the face. For a field the face is a normal, in the form of `packed_normal`.
+// For a shape that the ray enters, the face is one of shapes.glsl, and the voxel is the one that has the shape. With
+// kIsTextured in `what.x`, the last number of `lengths` has the bits of the texel where the ray enters.
 struct Body {
   ivec4 voxel;
   vec4 lengths;
@@ -98,9 +103,13 @@ struct Body {
 // Flags of a body's ends; the bits from kExitNormal on hold the normal at its exit, see normal_from_28.
 const uint kStartsInside = 1;
 const uint kBeginsInField = 2;
-const uint kEndsInField = 4;
+const uint kEndsInField = 4;  // or in a shape: its normal is known
+const uint kBeginsInShape = 8;
 const uint kHowItBegins = 3;
+const uint kBeginning = 11;   // all flags of its beginning
 const uint kExitNormal = 4;  // bits
+// Flag of its type.
+const uint kIsTextured = 0x80000000u;
 
 // A pixel's state: the transmittance of the glass so far, the position to continue from, and the sample's colour so
 // far.
@@ -118,12 +127,23 @@ const uint kGlow = 2;
 const uint kIsFar = 4;
 const uint kIsField = 8;
 const uint kIsBlended = 16;  // of a field: blended from the materials around, see blend_of_field
+const uint kIsShape = 32;
 
 uint kind_of(Point point) {
   return point.what.z & 3;
 }
 bool is_of_field(Point point) {
   return kHasFields && (point.what.z & kIsField) != 0;
+}
+bool is_of_shape(Point point) {
+  return kHasShapes && (point.what.z & kIsShape) != 0;
+}
+// Return true for the content numbers of fields and shapes.
+bool is_field_content(int content) {
+  return kHasFields && content == 1;
+}
+bool is_shape_content(int content) {
+  return kHasShapes && content == 2;
 }
 
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Nodes {
@@ -141,6 +161,12 @@ layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer Flo
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Vectors {
   vec4 at[];
 };
+// The entry of a type: the number of its six textured faces, from 1; 0: none.
+const uint kTextureNumber = 0xFFFF;
+const uint kTextureTurn = 16;  // bits: the turn of its voxels without data (pack_chunk)
+const uint kTurnBits = 0x1FF;
+const uint kIsTurnedByState = 0x80000000u;
+
 // A face of a type: the address of its texels, of all mipmap levels, level 0 first. Then in bits 0-3 log2 of the texels
 // per side; and for the texture's rows (bits 4-6) and columns (8-10) the axis of the grid, plus 4 if they run against
 // it; a word for fields: field_textures.glsl. `tint`: in linear light; w: the emission.
@@ -153,6 +179,14 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Te
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Grids {
   GridTrees at[];
+};
+// The shapes of a grid: all voxels that they touch, and those that shapes with glass touch.
+struct ShapeTrees {
+  Tree touched;
+  Tree glass;
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer ShapeGrids {
+  ShapeTrees at[];
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PlacedGrids {
   Placed at[];
@@ -254,8 +288,11 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   uint lamp_mask;  // for slots of bricks
   uint light_mask;  // for slots of light-level bricks
   uvec2 paths;  // for path tracing: paths/path_data.glsl
-  uvec2 texture_numbers;  // a number per type, from 1: of its six textured faces; 0: none; the last: types out of range
+  uvec2 texture_numbers;  // per type: kTextureNumber and flags; the last: types out of range
   uvec2 textured_faces;
+  uvec2 shape_grids;   // ShapeTrees of the first grids; the others have no shapes
+  uvec2 shape_models;  // vectors: shapes.glsl
+  uint shaped_grids;   // their number
 };
 
 #include "core.glsl"

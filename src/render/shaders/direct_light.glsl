@@ -127,7 +127,7 @@ vec3 sunlight_passed(uint slot, int home, Placed own, GridRay ray, float max_t) 
   uint i = 0;
   Body body;
   while (next_body(list, i, body)) {
-    passed *= passed_by(surface_of(body.what.x), body.lengths.z, has_own_length(body));
+    passed *= passed_by(surface_of_body(body), body.lengths.z, has_own_length(body));
   }
   return passed;
 }

@@ -4,8 +4,28 @@
 // Natural logarithm of the transmittance below which a body counts as closed.
 const float kClosed = -11.0;
 const float kDiagonal = 1.7320508;  // of a cube of 1
+const float kLeastLogarithm = -1e30;  // of the transmittance of opaque bodies
+const float kThinnest = 1e-9;         // length in voxels of a plate, which has none
 // Lengths of t within which two bodies touch: the rounding of single precision.
 const float kTouching = 4e-6;
+
+uint type_of(Body body) {
+  return kHasShapes ? body.what.x & ~kIsTextured : body.what.x;
+}
+
+// Returns the surface of a body: that of its type, with the colour and alpha of its texel if it is textured.
+Surface surface_of_body(Body body) {
+  Surface surface = surface_of(type_of(body));
+  if (!kHasShapes || (body.what.x & kIsTextured) == 0) return surface;
+  vec4 texel = unpackUnorm4x8(floatBitsToUint(body.lengths.w));
+  vec4 tint = shape_vector(side_index(body.what.y) + 4);
+  surface.colour = linear_from_srgb(texel.xyz) * tint.xyz;
+  surface.emitted = surface.colour * tint.w;
+  float open = 1.0 - texel.w;
+  surface.log_clarity = max(log(open), kLeastLogarithm);
+  surface.log_transmittance = max(log(open * (1.0 - texel.w * (1.0 - surface.colour))), vec3(kLeastLogarithm));
+  return surface;
+}
 
 bool reaches(Body body, float t) {
   return t <= body.lengths.y + kTouching * max(1.0, body.lengths.y);
@@ -13,12 +33,12 @@ bool reaches(Body body, float t) {
 // Returns true if a body counts with its own length: bodies of fields, bodies that a ray starts in, and clouds.
 bool has_own_length(Body body) {
 #ifdef HAS_CLOUDS
-  if (surface_of(body.what.x).scattering > 0.0) return true;
+  if (surface_of(type_of(body)).scattering > 0.0) return true;
 #endif
   return (body.what.z & kHowItBegins) != 0;
 }
 bool continues(Body body, Body next) {
-  return next.what.x == body.what.x && reaches(body, next.lengths.x);
+  return type_of(next) == type_of(body) && reaches(body, next.lengths.x);
 }
 
 struct BodyList {
@@ -78,7 +98,7 @@ void keep_body(inout BodyList list, Body body, float from_t, inout vec3 passed) 
   Body dropped;
   if (!insert_body(list, body, dropped)) return;
   list.dropped_t = min(list.dropped_t, dropped.lengths.x);
-  passed *= passed_by(surface_of(dropped.what.x), dropped.lengths.z, has_own_length(dropped));
+  passed *= passed_by(surface_of_body(dropped), dropped.lengths.z, has_own_length(dropped));
 }
 
 // The bodies of one instance along a ray, in order.
@@ -90,12 +110,12 @@ struct BodyRun {
 
 void end_as(inout Body body, Body next) {
   body.what.w = next.what.w;
-  if (kHasFieldGlass) body.what.z = (body.what.z & kHowItBegins) | (next.what.z & ~kHowItBegins);
+  if (kHasFieldGlass || kHasShapes) body.what.z = (body.what.z & kBeginning) | (next.what.z & ~kBeginning);
 }
 
 void add_to_run(inout BodyRun run, Body next, float from_t, inout BodyList list, inout vec3 passed) {
   if (!(next.lengths.z > 0.0)) return;
-  run.clarity += surface_of(next.what.x).log_clarity * next.lengths.z;
+  run.clarity += surface_of_body(next).log_clarity * next.lengths.z;
   if (run.has_body && continues(run.body, next)) {
     run.body.lengths.y = next.lengths.y;
     run.body.lengths.z += next.lengths.z;
@@ -353,10 +373,70 @@ void add_bodies(GlassCell cell, bool is_mixed, Body next, float enter_t, float e
   }
 }
 
-// Finds the bodies of an instance's voxels, or of its field, along a ray whose walk has started. `voxels_a_t`:
-// full-grid voxels per t.
-void find_bodies_in(int i, bool is_of_field, GridRay ray, float voxels_a_t, float max_t, float from_t,
-                    inout BodyList list, inout vec3 passed) {
+// Adds the glass of the shapes in a cell, in the order in which the ray enters its parts. `cell`: where the way through
+// them begins; `exit_t`: where the ray leaves the cell. `next`: as in `add_bodies`; its face is that of a ray that
+// starts inside.
+void add_shapes(ShapeRay cell, Body next, float exit_t, float ray_t, float voxels_a_t, float from_t, inout BodyRun run,
+                inout BodyList list, inout vec3 passed) {
+  float size = exit_t - cell.begin;
+  uint face = next.what.y;
+  ShapeRay ray = cell;
+  ShapeSpan span;
+  // The part added last, and the one after it: the nearest, and the first of equally near ones.
+  float last_t = -1.0;
+  int last = -1;
+  float nearest = kNever;
+  int found = -1;
+  int number = 0;
+  for (bool goes_on = true; goes_on;) {
+    bool is_part = step_in_shapes(ray, span);
+    float begin = max(span.enter_t, 0.0);
+    float end = min(span.exit_t, size);
+    bool is_plate = span.enter_t == span.exit_t;
+    bool is_inside = starts_inside(ray, span);
+    bool is_next = begin < nearest && (begin > last_t || (begin == last_t && number > last));
+    bool is_whole = is_plate ? begin == span.enter_t && end == span.exit_t : begin < end;
+    bool is_taken = is_part && is_next && is_whole && (is_inside || span.enter_side != kNoSide);
+    uint flags = kSideIsGlass;
+    if (is_taken && !is_inside) flags = side_flags(span.enter_side);
+    if (is_taken && (flags & kSideIsGlass) != 0) {
+      nearest = begin;
+      found = number;
+      next.voxel.xyz = shape_voxel(ray);
+      next.what.x = ray.shape & kShapeType;
+      next.what.y = is_inside ? face : span.enter_side;
+      next.what.z = kEndsInField | (is_inside ? kStartsInside : kBeginsInShape);
+      next.lengths = vec4(ray_t + cell.begin + begin, ray_t + cell.begin + end,
+                          is_plate ? kThinnest : (end - begin) * voxels_a_t, cell.begin + begin);
+      if ((flags & kSideHasTexels) != 0) {
+        next.what.x |= kIsTextured;
+        next.lengths.w = uintBitsToFloat(side_texel(span.enter_side, ray.origin + span.enter_t * ray_direction));
+      }
+#if defined(KEEPS_BODIES) || defined(HOLDS_BODIES)
+      next.what.z |= packed_in_28(span.exit_normal) << kExitNormal;
+#endif
+    }
+    if (is_part) ++number;
+    if (!has_more(ray)) {
+      goes_on = found >= 0;
+      // A part within the last body is the same box in another cell, or a crossing plate.
+      bool is_within = run.has_body && continues(run.body, next) && next.lengths.y <= run.body.lengths.y;
+      if (goes_on && !is_within) add_to_run(run, next, from_t, list, passed);
+      goes_on = goes_on && run.clarity > kClosed;
+      ray = cell;
+      last_t = nearest;
+      last = found;
+      nearest = kNever;
+      found = -1;
+      number = 0;
+    }
+  }
+}
+
+// Finds the bodies of an instance's voxels, of its field or of its shapes, along a ray whose walk has started.
+// `voxels_a_t`: full-grid voxels per t.
+void find_bodies_in(int i, bool is_of_field, bool is_of_shapes, GridRay ray, float voxels_a_t, float max_t,
+                    float from_t, inout BodyList list, inout vec3 passed) {
   float room = max_t - ray.t;
   BodyRun run;
   run.clarity = 0.0;
@@ -370,7 +450,11 @@ void find_bodies_in(int i, bool is_of_field, GridRay ray, float voxels_a_t, floa
     GlassCell cell;
     bool is_mixed = false;
     int shift = 0;
-    if (is_of_field) {
+    ShapeRay shapes;
+    if (is_of_shapes) {
+      shapes = shapes_found();
+      next.what = uvec4(0, face_found(), 0, 8 * uint(i));
+    } else if (is_of_field) {
       Numbers block;
       is_mixed = glass_block_found(block, next.what.x);
       next.what = uvec4(next.what.x, kNoNormal, inside | kBeginsInField | kEndsInField, 8 * uint(i));
@@ -386,6 +470,10 @@ void find_bodies_in(int i, bool is_of_field, GridRay ray, float voxels_a_t, floa
       next.what = uvec4(type_found(), face_found(), inside, 8 * uint(i));
     }
     goes_on = leave_block(shift, room);
+    if (is_of_shapes) {
+      add_shapes(shapes, next, min(walk_t, room), ray.t, voxels_a_t, from_t, run, list, passed);
+      continue;
+    }
     if (!is_of_field) next.what.w += uint(2 * walk_axis + (ray_forward[walk_axis] ? 0 : 1));
     add_bodies(cell, is_mixed, next, enter_t, min(walk_t, room), ray.t, voxels_a_t, from_t, run, list, passed);
   }
@@ -397,10 +485,13 @@ void find_bodies(int i, GridTrees trees, GridRay ray, float voxels_a_t, float ma
                  inout BodyList list, inout vec3 passed) {
   for (int content = 0; content < kGlassContents; ++content) {
     bool is_of_field = kHasFieldGlass && content == 1;
+    bool is_of_shapes = is_shape_content(content);
+    if (kHasShapes && !kHasFieldGlass && content == 1) continue;
     Tree tree = trees.transparent;
     if (is_of_field) tree = trees.glass;
+    if (is_of_shapes) tree = shape_trees(placed_at(i).ref_base.w).glass;
     if (!start_walk(tree, ray.base, ray.origin, ray.direction, max_t - ray.t, -1)) continue;
-    find_bodies_in(i, is_of_field, ray, voxels_a_t, max_t, from_t, list, passed);
+    find_bodies_in(i, is_of_field, is_of_shapes, ray, voxels_a_t, max_t, from_t, list, passed);
   }
 }
 

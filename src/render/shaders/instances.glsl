@@ -100,13 +100,10 @@ ViewRay view_from_grid(Placed placed, GridRay ray) {
   return ViewRay(placed.ref_view.xyz + turned(placed.view_axes, from_ref), turned(placed.view_axes, ray.direction));
 }
 
-// Returns true if a content number (kContents: voxels, then field) is the field.
-bool is_field_content(int content) {
-  return kHasFields && content == 1;
-}
-
-// Returns the tree of a content's opaque part.
+// Returns the tree of a content's opaque part (kContents); for shapes, of all voxels that they touch.
 Tree opaque_tree(Placed placed, int content) {
+  if (is_shape_content(content)) return shape_trees(placed.ref_base.w).touched;
+  if (kHasShapes && !kHasFields && content == 1) return no_tree();
   Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
   if (is_field_content(content)) tree = Grids(frame().grids).at[placed.ref_base.w].field;
   return tree;
@@ -118,7 +115,7 @@ bool find_opaque(Placed placed, int content, GridRay ray, float max_t, out float
   Tree tree = opaque_tree(placed, content);
   FieldHit hit;
   return start_walk(tree, ray.base, ray.origin, ray.direction, max_t, -1) &&
-         find_content(is_field_content(content), max_t, t, hit);
+         find_content(content, max_t, t, hit);
 }
 
 // Returns the part of a camera ray's direction that depends on the image position, in pixels.

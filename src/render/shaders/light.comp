@@ -65,7 +65,16 @@ float openness_of_far(Point point) {
 
 // Returns the normal of a surface point, in its grid.
 vec3 grid_normal(Point point) {
+  if (is_of_shape(point)) return side_normal(point.what.y);
   return is_of_field(point) ? normal_of(point.what.y) : face_normal(point.what.y);
+}
+// Returns the face of a surface point, not of a field; of a shape, the direction nearest to its normal.
+uint face_of(Point point) {
+  return is_of_shape(point) ? side_direction(point.what.y) : point.what.y;
+}
+// Returns true if a surface point is not perpendicular to an axis of its grid.
+bool is_inclined(Point point) {
+  return is_of_field(point) || (is_of_shape(point) && is_tilted(point.what.y));
 }
 
 // Rotates `direction` as (0, 1, 0) is rotated to the unit vector `normal`: render/light/occlusion_directions.h.
@@ -79,8 +88,8 @@ vec3 turned_from_up(vec3 direction, vec3 normal) {
 // Returns a ray that starts slightly in front of a surface point's face.
 GridRay ray_from(Point point, Placed placed) {
   GridRay ray = GridRay(point.voxel.xyz & ~63, vec3(point.voxel.xyz & 63) + point.inside.xyz, vec3(0.0), 0.0);
-  if (is_of_field(point)) {
-    ray.origin += frame().lift / placed.ref_view.w * normal_of(point.what.y);
+  if (is_of_field(point) || is_of_shape(point)) {
+    ray.origin += frame().lift / placed.ref_view.w * grid_normal(point);
     return ray;
   }
   ray.origin[axis_of(point.what.y)] += frame().lift / placed.ref_view.w * sign_of(point.what.y);
@@ -90,7 +99,8 @@ GridRay ray_from(Point point, Placed placed) {
 // The rays of a surface point, by number: -1 is the sun's ray, then the occlusion rays, then the lamps' rays.
 struct LightRays {
   vec3 normal;  // in the grid
-  uint face;    // for a field's surface, directions are those for an upper face, rotated
+  uint face;    // for an inclined surface, directions are those for an upper face, rotated
+  bool is_inclined;
   bool is_field;
   float cosine;  // of the sun
   int first;
@@ -110,10 +120,11 @@ LightRays rays_of(Point point, Placed placed, GridRay from) {
   const uint kUp = 2;
   LightRays rays;
   rays.is_field = is_of_field(point);
-  rays.face = rays.is_field ? kUp : point.what.y;
+  rays.is_inclined = is_inclined(point);
+  rays.face = rays.is_inclined ? kUp : face_of(point);
   rays.normal = grid_normal(point);
   rays.cosine = rays.face < 4 ? placed.diffuse[0][rays.face] : placed.diffuse[1][rays.face - 4];
-  if (rays.is_field) rays.cosine = max(dot(rays.normal, placed.to_sun.xyz), 0.0) * placed.to_sun.w;
+  if (rays.is_inclined) rays.cosine = max(dot(rays.normal, placed.to_sun.xyz), 0.0) * placed.to_sun.w;
   bool is_far = (point.what.z & kIsFar) != 0;
   rays.open_count = traces_occlusion(point) && !is_far ? frame().occlusion_count : 0;
   rays.lamps = uvec2(0);
@@ -136,7 +147,7 @@ bool aim(int number, LightRays rays, Placed placed, inout GridRay ray, out float
     ray.direction = placed.to_sun.xyz;
   } else if (number < rays.open_count) {
     ray.direction = occlusion_direction(rays.face, number, rays.hash);
-    if (rays.is_field) ray.direction = turned_from_up(ray.direction, rays.normal);
+    if (rays.is_inclined) ray.direction = turned_from_up(ray.direction, rays.normal);
   } else {
     uint lamp = rays.lamps.x + uint(number - rays.open_count);
     brought = light_of_lamp(lamp, rays.in_view, rays.normal_in_view, placed, ray, max_t);
@@ -149,8 +160,10 @@ bool aim(int number, LightRays rays, Placed placed, inout GridRay ray, out float
 float openness_of(Point point, Placed placed, int open) {
   if ((point.what.z & kIsFar) != 0) return openness_of_far(point);
   if (has(kOcclusionVertex) && !is_of_field(point)) {
+    // Sides inside a voxel have no corners of voxels.
+    if (is_of_shape(point) && (side_flags(point.what.y) & kSideIsOnVoxel) == 0) return 1.0;
     Tree opaque = opaque_tree(placed, 0);
-    uint face = point.what.y;
+    uint face = face_of(point);
     return 1.0 - occlusion_at(corner_occlusion(opaque, point.voxel.xyz, face), face, point.inside.xyz) / 3.0;
   }
   if (!traces_occlusion(point)) return 0.0;
@@ -160,7 +173,7 @@ float openness_of(Point point, Placed placed, int open) {
 
 LevelPlace level_place(Point point) {
   return LevelPlace(point.voxel.xyz, point.inside.xyz, grid_normal(point),
-                    is_of_field(point) ? -1 : int(point.what.y));
+                    is_of_field(point) || is_of_shape(point) ? -1 : int(point.what.y));
 }
 
 // Computes the light of the sun and lamps at a surface point, and its openness. One loop over all rays;
@@ -205,6 +218,60 @@ FieldPoint field_point(Point point, Placed placed) {
   return FieldPoint(voxel, point.inside.xyz * voxels, normal_of(point.what.y), spacing * spacing * voxels * voxels);
 }
 
+// Shows the look of a shape's side: its texture, in the mipmap level that fits the distance of samples, or its tint.
+void show_side(Point point, Placed placed, inout Surface surface) {
+  uint side = side_index(point.what.y);
+  uvec4 what = shape_numbers(side + 3);
+  if ((what.z & kSideHasLook) == 0) return;
+  vec3 texel = vec3(1.0);
+  if ((what.z & kSideHasTexels) != 0) {
+    float spacing = frame().down.w / placed.ref_inside.w;
+    if (has(kPerspective)) spacing *= point.inside.w;
+    int last = int(what.z & 15);
+    float square = spacing * spacing * uintBitsToFloat(what.w);
+    int log_size = last - mipmap_level(square, last);
+    texel = linear_from_srgb(unpackUnorm4x8(side_texel(side, point.inside.xyz, log_size)).xyz);
+  }
+  set_texel(texel, shape_vector(side + 4), surface);
+}
+
+// Returns the turn of a voxel by its state, as nine bits (pack_chunk). `turn`: of its type's voxels without data.
+uint turn_by_data(Tree opaque, ivec3 voxel, uint turn) {
+  uvec4 chunk;
+  if (!find_chunk(opaque, voxel, chunk)) return turn;
+  uvec2 types = Nodes(record_of(chunk)).at[0].xy;
+  uint count = Numbers(address_before(types, 4)).at[0];
+  Numbers list = Numbers(address_before(types, 4 + 4 * count));
+  ivec3 at = voxel & 63;
+  uint number = uint(at.x + 64 * (at.y + 64 * at.z));
+  uint low = 0;
+  for (uint high = count; low < high;) {
+    uint middle = (low + high) / 2;
+    if ((list.at[middle] & 0x3FFFF) < number) {
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+  return low < count && (list.at[low] & 0x3FFFF) == number ? list.at[low] >> 18 : turn;
+}
+
+// Turns a face of a voxel, and a position in it, to the unturned cube, if the voxel's state turns its type.
+void turn_by_state(Point point, Placed placed, inout uint face, inout vec3 inside) {
+  uint how = Numbers(frame().texture_numbers).at[min(point.what.x, frame().last_surface)];
+  if ((how & kIsTurnedByState) == 0) return;
+  uint turn = turn_by_data(opaque_tree(placed, 0), point.voxel.xyz, how >> kTextureTurn & kTurnBits);
+  vec3 off = inside - 0.5;
+  uint shown = face;
+  for (int i = 0; i < 3; ++i) {
+    uint from = turn >> (3 * i) & 7;
+    int axis = int(from & 3);
+    inside[i] = ((from & 4) != 0 ? -off[axis] : off[axis]) + 0.5;
+    if (axis == axis_of(face)) shown = uint(2 * i) + ((face & 1) ^ (from >> 2));
+  }
+  face = shown;
+}
+
 // Shows the texture of a voxel's face. Seen from inside, it lies around the ray's start.
 void show_texture(Point point, Placed placed, inout Surface surface) {
   uint face = point.what.y;
@@ -219,6 +286,7 @@ void show_texture(Point point, Placed placed, inout Surface surface) {
   spacing *= has(kPerspective) ? away : 1.0 / placed.ref_inside.w;
   // Cells of halved grids and impostors stand for many voxels.
   bool is_mean = (point.what.z & kIsFar) != 0 || placed.ref_view.w != 1.0;
+  if (!is_mean) turn_by_state(point, placed, face, inside);
   show_texture(point.what.x, face, inside, is_mean ? kMeanOfFace : spacing * spacing, surface);
 }
 
@@ -235,6 +303,8 @@ Surface surface_at(Point point, Placed placed) {
     vec3 cell = floor(at);
     if (kHasTextures) blended_point = field_point(point, placed);
     return blend_of_field(opaque_tree(placed, 1), point.voxel.xyz + ivec3(cell), at - cell, point.what.x);
+  } else if (is_of_shape(point)) {
+    show_side(point, placed, surface);
   } else if (kHasTextures && !is_of_field(point)) {
     show_texture(point, placed, surface);
   }
@@ -269,7 +339,15 @@ Point point_of(Body body) {
   point.voxel = body.voxel;
   bool is_of_field = kHasFieldGlass && (body.what.z & kBeginsInField) != 0;
   uint kind = (body.what.z & kStartsInside) != 0 ? kGlow : kSurface;
-  point.what = uvec4(body.what.xy, kind | (is_of_field ? kIsField : 0), 0);
+  point.what = uvec4(type_of(body), body.what.y, kind | (is_of_field ? kIsField : 0), 0);
+  if (kHasShapes && (body.what.z & kBeginsInShape) != 0) {
+    Placed placed = placed_at(body.voxel.w);
+    float t = body.lengths.x - (placed.start.w - frame().view_depth) * length_a_depth(image_point());
+    vec3 at = exact_place_on_shape(placed, exact_direction(), body.voxel.xyz, body.what.y, t);
+    point.inside = vec4(at, body.lengths.x);
+    point.what.z |= kIsShape;
+    return point;
+  }
   ExactRay ray = exact_ray_in(placed_at(body.voxel.w), exact_direction());
   Pair start = start_from(ray, placed_at(body.voxel.w), body.voxel.xyz);
   Pair t = Pair(vec3(body.lengths.w), vec3(0.0));
@@ -306,7 +384,7 @@ bool light_pixel(uint slot, inout State state) {
       state.colour.xyz += weight * sky_colour(sky_up(at));
       return true;
     }
-    if (!is_of_field(point)) point.inside.xyz = on_face(point.inside.xyz, point.what.y);
+    if (!is_of_field(point) && !is_of_shape(point)) point.inside.xyz = on_face(point.inside.xyz, point.what.y);
     state.colour.xyz += weight * light_of(point, slot);
     if (!is_body) return true;
   }

@@ -31,7 +31,15 @@ uint texel_number(vec3 inside, uint axis, uint size) {
 
 // Returns the number of a type's textured faces, from 1; 0 if it has none.
 uint textures_of(uint type) {
-  return Numbers(frame().texture_numbers).at[min(type, frame().last_surface)];
+  return Numbers(frame().texture_numbers).at[min(type, frame().last_surface)] & kTextureNumber;
+}
+
+// Returns the mipmap level of a texture of 2^last texels per side: log2 of the texels between samples, rounded. That is
+// half the exponent of twice their square, plus the texture's own size. `square_spacing`: the square of the samples'
+// distance, in sides of the texture.
+int mipmap_level(float square_spacing, int last) {
+  int exponent = int(floatBitsToUint(2.0 * square_spacing) >> 23) - 127;
+  return clamp((exponent >> 1) + last, 0, last);
 }
 
 // Returns the colour of the nearest texel, without tint, in the mipmap level that fits the distance of samples; matches
@@ -39,9 +47,7 @@ uint textures_of(uint type) {
 // `square_spacing`: the square of the distance of samples there, in voxels; kMeanOfFace: the mean of the texture.
 vec3 texel_of(uvec4 record, vec3 inside, float square_spacing) {
   int last = int(record.z & 15);
-  // log2 of the texels between samples, rounded: half the exponent of twice their square, plus that of the size.
-  int exponent = int(floatBitsToUint(2.0 * square_spacing) >> 23) - 127;
-  uint log_size = uint(last - clamp((exponent >> 1) + last, 0, last));
+  uint log_size = uint(last - mipmap_level(square_spacing, last));
   uint column = texel_number(inside, record.z >> 4 & 7, 1u << log_size);
   uint row = texel_number(inside, record.z >> 8 & 7, 1u << log_size);
   // The levels before have size^2 * (1 + 1/4 + ...) texels.

@@ -154,11 +154,12 @@ void meet_content(int content, int i, Placed placed, Pair direction, float scale
   if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, room, moved)) return;
   float walked_t;
   FieldHit hit;
-  if (!find_content(is_field, room, walked_t, hit)) return;
+  if (!find_content(content, room, walked_t, hit)) return;
   float found_t = moved_t + walked_t;
   // Among equally near hits the first instance wins; equal means within the rounding of each grid's own space.
   bool is_equal = point.voxel.w >= 0 && abs(found_t - limit) <= rounding;
-  if (is_equal ? i + content > point.voxel.w : found_t > limit) return;
+  // A shape counts before a voxel, and a voxel before a field.
+  if (is_equal ? i + (is_field ? 1 : 0) > point.voxel.w : found_t > limit) return;
   nearest = Nearest(placed.start.w, found_t);
   point.voxel = ivec4(walk_voxel, i);
   point.inside.w = in_grid.t + found_t;
@@ -167,6 +168,11 @@ void meet_content(int content, int i, Placed placed, Pair direction, float scale
     point.inside.xyz = hit.inside;
     point.what = uvec4(material_found(tree, hit.inside), packed_normal(normal_found(hit.inside)),
                        kIsField | (is_inside ? kUnlit : kSurface | kIsBlended), floatBitsToUint(found_t));
+  } else if (is_shape_content(content)) {
+    bool is_inside = shape_met.starts_inside;
+    point.voxel = ivec4(shape_met.voxel, i);
+    point.what = uvec4(shape_met.type, is_inside ? face_found() : shape_met.side,
+                       is_inside ? kUnlit : kSurface | kIsShape, floatBitsToUint(found_t));
   } else {
     point.what = uvec4(type_found(), face_found(), walk_axis < 0 ? kUnlit : kSurface, floatBitsToUint(found_t));
   }
@@ -196,7 +202,10 @@ Point first_hit(vec2 at) {
   }
   // Inside a voxel the position is not used; on an impostor it is already known.
   bool is_far = (point.what.z & kIsFar) != 0;
-  if (point.voxel.w >= 0 && kind_of(point) == kSurface && !is_of_field(point) && !is_far) {
+  if (is_of_shape(point)) {
+    point.inside.xyz = exact_place_on_shape(placed_at(point.voxel.w), direction, point.voxel.xyz, point.what.y,
+                                            uintBitsToFloat(point.what.w));
+  } else if (point.voxel.w >= 0 && kind_of(point) == kSurface && !is_of_field(point) && !is_far) {
     point.inside.xyz = exact_place(placed_at(point.voxel.w), direction, point.voxel.xyz, point.what.y);
   }
   return point;

@@ -17,6 +17,12 @@ vec3 field_normal(int instance, vec3 in_grid) {
 // Returns the normal of the surface where a ray enters or leaves a body; unit, in the world.
 vec3 normal_of_side(Body body, bool is_entered) {
   int instance = is_entered ? body.voxel.w : int(body.what.w >> 3);
+  if (kHasShapes && is_entered && (body.what.z & kBeginsInShape) != 0) {
+    return field_normal(instance, side_normal(body.what.y));
+  }
+  if (kHasShapes && !is_entered && (body.what.z & kEndsInField) != 0) {
+    return field_normal(instance, normal_from_28(body.what.z >> kExitNormal));
+  }
   uint in_field = is_entered ? kBeginsInField : kEndsInField;
   if (kHasFieldGlass && (body.what.z & in_field) != 0) {
     return field_normal(instance, is_entered ? normal_of(body.what.y) : normal_from_28(body.what.z >> kExitNormal));
@@ -40,11 +46,11 @@ void meet_surfaces(Body from, bool has_from, Body to, bool has_to, inout State s
     if (!is_met) continue;
     bool is_entered = !is_left || touches;
     vec3 normal = normal_of_side(is_entered ? to : from, is_entered);
-    float behind = is_entered ? surface_of(to.what.x).ior : 1.0;
+    float behind = is_entered ? surface_of(type_of(to)).ior : 1.0;
     float before = 1.0;
     vec3 tint = vec3(1.0);
     if (is_left) {
-      Surface surface = surface_of(from.what.x);
+      Surface surface = surface_of(type_of(from));
       before = surface.ior;
       tint = passed_by(surface, from.lengths.z, has_own_length(from));
     }
@@ -101,7 +107,7 @@ bool enter_next(inout Passage way, float opaque_t, inout State state) {
 // Passes through the body; returns the weight of its own light.
 vec3 pass_body(Passage way, inout State state) {
   Body body = way.body;
-  Surface surface = surface_of(body.what.x);
+  Surface surface = surface_of_body(body);
   // When values are shown, glass counts as opaque, except the body around the camera.
   if (has(kShowOcclusion) || has(kShowNormals)) {
     if ((body.what.z & kStartsInside) != 0) return vec3(0.0);

@@ -243,6 +243,10 @@ uvec2 address_after(uvec2 address, uint bytes) {
   return uvec2(low, address.y + carry);
 }
 
+uvec2 address_before(uvec2 address, uint bytes) {
+  return uvec2(address.x - bytes, address.y - (address.x < bytes ? 1 : 0));
+}
+
 // Returns a sample of a block, which holds the samples around a word's cells, from the one before its first corner on.
 float sample_of(Numbers block, ivec3 at) {
   uint i = uint((at.z * kBlockEdge + at.y) * kBlockEdge + at.x);
@@ -386,14 +390,21 @@ bool meet_cell(float max_t, out FieldHit hit) {
   return true;
 }
 
-// Like find_voxel; in the tree of a field, finds the first point with a negative density. `t`: the distance along the
-// ray.
-bool find_content(bool is_field, float max_t, out float t, out FieldHit hit) {
+#include "shapes.glsl"
+
+// Like find_voxel; in the tree of a field, finds the first point with a negative density, and in that of shapes, the
+// first visible part (shape_met). `t`: the distance along the ray.
+bool find_content(int content, float max_t, out float t, out FieldHit hit) {
   while (find_voxel(max_t)) {
     t = walk_t;
-    if (!is_field) return true;
-    bool is_met = meet_cell(max_t, hit);
-    t = hit.t;
+    bool is_met = true;
+    if (is_shape_content(content)) {
+      is_met = meet_shapes(max_t);
+      t = shape_met.t;
+    } else if (is_field_content(content)) {
+      is_met = meet_cell(max_t, hit);
+      t = hit.t;
+    }
     if (is_met) return true;
     if (!leave_block(0, max_t)) return false;
   }
@@ -444,17 +455,23 @@ vec3 normal_found(vec3 inside) {
   return block_found(block) ? normal_in(block, (walk_voxel & 3) + 1, inside) : vec3(0.0);
 }
 
-// Returns the type of a voxel, or of a field's sample; 0 if the tree has no chunk there.
-uint type_at(Tree tree, ivec3 at) {
-  if (any(lessThan(at, tree.low.xyz)) || any(greaterThanEqual(at, tree.high.xyz))) return 0;
-  uvec4 node = tree.root;
+// Finds the node of the chunk of a voxel, or of a field's sample. Returns false if the tree has none.
+bool find_chunk(Tree tree, ivec3 at, out uvec4 node) {
+  if (any(lessThan(at, tree.low.xyz)) || any(greaterThanEqual(at, tree.high.xyz))) return false;
+  node = tree.root;
   for (int level = tree.low.w; level > 2; --level) {
     if ((node.z & 1) != 0) break;
     uint index = index_in(at, level);
-    if (!has_child(node, index)) return 0;
+    if (!has_child(node, index)) return false;
     node = Nodes(node.zw).at[child_of(node, index)];
   }
-  return type_in(record_of(node), at & 63);
+  return true;
+}
+
+// Returns the type of a voxel, or of a field's sample; 0 if the tree has no chunk there.
+uint type_at(Tree tree, ivec3 at) {
+  uvec4 node;
+  return find_chunk(tree, at, node) ? type_in(record_of(node), at & 63) : 0;
 }
 
 // Returns the material of the solid sample nearest to the hit.

@@ -114,22 +114,6 @@ bool has_type_of(const SceneGrid& grid, const std::vector<VoxelType>& ascending)
   });
 }
 
-// Returns how many voxels the shapes of any type reach outside their own: 0 or 1, not less than the true number.
-int reach_of_shapes(const VoxelRegistry& types) {
-  if (!types.has_shapes()) return 0;
-  const auto stays_inside = [](const ShapeElement& element) {
-    return !element.turn && glm::all(glm::greaterThanEqual(element.min, Vec3(0.0F))) &&
-           glm::all(glm::lessThanEqual(element.max, Vec3(kShapeUnits)));
-  };
-  for (std::size_t type = 0; type < types.size(); ++type) {
-    if (!types.is_shaped(static_cast<VoxelType>(type))) continue;
-    for (const ShapePart& part : types[static_cast<VoxelType>(type)].shapes.rules().parts) {
-      if (!std::ranges::all_of(part.shape.elements(), stays_inside)) return 1;
-    }
-  }
-  return 0;
-}
-
 void put_trees(const TreeCache& trees, PlacedGrid& placed) {
   placed.opaque = &trees.opaque();
   placed.transparent = trees.transparent();

@@ -6,6 +6,9 @@
 #include <utility>
 #include <vector>
 
+#include <glm/common.hpp>
+#include <glm/vector_relational.hpp>
+
 #include <quoin/core/assert.h>
 #include <quoin/scene/scene_tracer.h>
 
@@ -128,6 +131,21 @@ struct GridData {
 };
 
 }  // namespace
+
+int reach_of_shapes(const VoxelRegistry& types) {
+  if (!types.has_shapes()) return 0;
+  const auto stays_inside = [](const ShapeElement& element) {
+    return !element.turn && glm::all(glm::greaterThanEqual(element.min, Vec3(0.0F))) &&
+           glm::all(glm::lessThanEqual(element.max, Vec3(kShapeUnits)));
+  };
+  for (std::size_t type = 0; type < types.size(); ++type) {
+    if (!types.is_shaped(static_cast<VoxelType>(type))) continue;
+    for (const ShapePart& part : types[static_cast<VoxelType>(type)].shapes.rules().parts) {
+      if (!std::ranges::all_of(part.shape.elements(), stays_inside)) return 1;
+    }
+  }
+  return 0;
+}
 
 SplitField::SplitField(const DensityGrid& whole, const VoxelRegistry& types)
     : whole_(&whole),

@@ -73,6 +73,10 @@ struct TracedShapes {
   [[nodiscard]] bool has_glass() const { return !glass.bounds().empty(); }
 };
 
+/// Returns how many voxels the shapes of any type reach outside their own: 0 or 1, not less than the true number. Cost:
+/// O(types and elements).
+[[nodiscard]] int reach_of_shapes(const VoxelRegistry& types);
+
 /// The treatment of voxels whose type has shapes.
 enum class ShapedVoxels : std::uint8_t {
   AsCubes,  ///< transparent cubes of their type's colour

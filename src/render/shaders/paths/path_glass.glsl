@@ -27,7 +27,11 @@ void place_along(int instance, ViewRay ray, float t, out ivec4 voxel, out vec3 i
   inside = at - whole;
 }
 
+bool begins_in_shape(Body body) {
+  return kHasShapes && (body.what.z & kBeginsInShape) != 0;
+}
 vec3 normal_entered(Body body) {
+  if (begins_in_shape(body)) return side_normal(body.what.y);
   bool in_field = kHasFieldGlass && (body.what.z & kBeginsInField) != 0;
   return in_field ? normal_of(body.what.y) : face_normal(body.what.y);
 }
@@ -64,27 +68,27 @@ uint turn_at(Glass glass, ViewRay ray) {
 }
 
 uint hit_glass(Body body, ViewRay ray) {
-  Surface surface = surface_of(body.what.x);
+  Surface surface = surface_of_body(body);
   bool in_field = kHasFieldGlass && (body.what.z & kBeginsInField) != 0;
   ivec4 voxel;
   vec3 inside;
   place_along(body.voxel.w, ray, body.lengths.x, voxel, inside);
   inside += vec3(voxel.xyz - body.voxel.xyz);
-  if (!in_field) inside = put_on_face(inside, body.what.y);
+  if (!in_field && !begins_in_shape(body)) inside = put_on_face(inside, body.what.y);
   vertex.is_ground = vertex.is_medium = false;
   put_on_surface(body.voxel, inside, normal_entered(body));
   vertex.colour = surface.colour;
   vertex.roughness = 1.0;
   vertex.metalness = 0.0;
   count_scene();
-  note_layers(body.lengths.x + behind, body.what.x);
+  note_layers(body.lengths.x + behind, type_of(body));
   add_emitted(surface.emitted, -1, vec3(0.0), 0.0);
   return kScatters;
 }
 
 // Scatters the path in a cloud if `u` is below the share of paths that scatter there.
 void scatter_in(Body body, float u, inout Glass glass) {
-  Surface surface = surface_of(body.what.x);
+  Surface surface = surface_of(type_of(body));
   float share = free_way(u, surface.scattering) / max(body.lengths.z, 1e-12);
   glass.t = body.lengths.x + (body.lengths.y - body.lengths.x) * clamp(share, 0.0, 1.0);
   glass.colour = surface.colour;
@@ -95,7 +99,7 @@ void scatter_in(Body body, float u, inout Glass glass) {
 // Passes straight through a body: light between surfaces, and all paths in clouds. The glass's opaque share stops the
 // path at random.
 void pass_through(Body body, inout float u, inout Glass glass) {
-  Surface surface = surface_of(body.what.x);
+  Surface surface = surface_of_body(body);
   bool is_cloud = surface.scattering > 0.0;
   float voxels = length_of(surface, body);
   float cover = cover_of(surface, voxels);
@@ -115,14 +119,15 @@ void pass_through(Body body, inout float u, inout Glass glass) {
 
 // `u`: a random number between 0 and 1.
 void enter_glass(Body body, float u, inout Glass glass) {
-  Surface surface = surface_of(body.what.x);
+  Surface surface = surface_of_body(body);
   vec3 in_grid = normal_entered(body);
   vec3 normal = turned(placed_at(body.voxel.w).view_axes, in_grid) / placed_at(body.voxel.w).ref_inside.w;
   vec3 direction = path.direction.xyz;
   float cosine = clamp(-dot(normal, direction), 1e-4, 1.0);
   if (is(kIsFirst)) {
     bool in_field = kHasFieldGlass && (body.what.z & kBeginsInField) != 0;
-    uint id = surface_id(voxel_of_grid(body.voxel), in_field ? 0 : body.what.y, in_field, body.voxel.w, body.what.x);
+    uint face = in_field ? 0 : begins_in_shape(body) ? side_direction(body.what.y) : body.what.y;
+    uint id = surface_id(voxel_of_grid(body.voxel), face, in_field, body.voxel.w, type_of(body));
     note_part(vec3(1.0), id, false, vec3(0.0), vec3(0.0));
   }
   float eta = 1.0 / surface.ior;
@@ -142,21 +147,21 @@ void enter_glass(Body body, float u, inout Glass glass) {
   } else {
     glass.direction = direction * eta + normal * (eta * cosine - through.y);
     glass.normal = -in_grid;
-    glass.within = body.what.x;
+    glass.within = type_of(body);
   }
 }
 
 // Follows a path within glass to the end of the body, or to an object inside it, at `opaque_t`.
 void leave_glass(Body body, bool has_next, Body next, float opaque_t, float u, inout Glass glass) {
-  Surface surface = surface_of(body.what.x);
+  Surface surface = surface_of(type_of(body));
   path.throughput.xyz *= tint_of(surface, body.lengths.z);
   int instance = int(body.what.w >> 3);
   Placed placed = placed_at(instance);
   bool touches = has_next && reaches(body, next.lengths.x);
   // The glass lies on an opaque surface.
   if (!touches && opaque_t <= body.lengths.y + frame().lift * placed.ref_inside.w) return;
-  float other = touches ? surface_of(next.what.x).ior : 1.0;
-  bool in_field = kHasFieldGlass && (body.what.z & kEndsInField) != 0;
+  float other = touches ? surface_of(type_of(next)).ior : 1.0;
+  bool in_field = (kHasFieldGlass || kHasShapes) && (body.what.z & kEndsInField) != 0;
   vec3 in_grid = in_field ? normal_from_28(body.what.z >> kExitNormal) : face_normal(body.what.w & 7);
   vec3 normal = turned(placed.view_axes, in_grid) / placed.ref_inside.w;
   vec3 direction = path.direction.xyz;
@@ -174,15 +179,15 @@ void leave_glass(Body body, bool has_next, Body next, float opaque_t, float u, i
   glass.direction =
       is_mirrored ? direction - normal * (2.0 * cosine) : direction * eta + normal * (through.y - eta * cosine);
   glass.normal = is_mirrored ? -in_grid : in_grid;
-  glass.within = is_mirrored ? body.what.x : touches ? next.what.x : 0;
+  glass.within = is_mirrored ? type_of(body) : touches ? type_of(next) : 0;
 }
 
 // Handles the first glass body on a ray (clouds are skipped), and the body after it. `u`: a random number between 0 and
 // 1, not used by clouds.
 void look_into(bool has_body, Body body, bool has_next, Body next, float opaque_t, float u, inout Glass glass) {
-  bool is_within = has_body && is_begun(body) && (path.more.x == 0 || body.what.x == path.more.x);
+  bool is_within = has_body && is_begun(body) && (path.more.x == 0 || type_of(body) == path.more.x);
   if (is_within) {  // or the camera is inside
-    path.more.x = body.what.x;
+    path.more.x = type_of(body);
     leave_glass(body, has_next, next, opaque_t, u, glass);
     return;
   }

@@ -73,7 +73,9 @@ struct Hit {
   uint type;
   uint face;
   bool in_field;
+  bool in_shape;  // met `side`, of shapes.glsl
   bool starts_inside;
+  uint side;
 };
 
 PathState path;
@@ -203,11 +205,12 @@ bool meet_content(int content, int i, Placed placed, GridRay ray, float max_t, i
   Tree tree = opaque_tree(placed, content);
   bool is_field = is_field_content(content);
   if (!start_walk(tree, ray.base, ray.origin, ray.direction, limit, -1)) return false;
-  if (!find_content(is_field, limit, t, in_cell)) return false;
+  if (!find_content(content, limit, t, in_cell)) return false;
   if (hit.voxel.w >= 0 && (t > hit.t || (t == hit.t && i > hit.voxel.w))) return false;
   hit.voxel = ivec4(walk_voxel, i);
   hit.t = t;
   hit.in_field = is_field;
+  hit.in_shape = is_shape_content(content) && !shape_met.starts_inside;
   hit.starts_inside = walk_axis < 0;
   hit.face = face_found();
   if (is_field) {
@@ -215,6 +218,17 @@ bool meet_content(int content, int i, Placed placed, GridRay ray, float max_t, i
     hit.inside = in_cell.inside;
     hit.normal = normal_found(in_cell.inside);
     hit.type = material_found(tree, in_cell.inside);
+  } else if (is_shape_content(content)) {
+    hit.starts_inside = shape_met.starts_inside;
+    hit.voxel.xyz = shape_met.voxel;
+    hit.inside = ray_origin + t * ray_direction - vec3(shape_met.voxel - ray_base);
+    hit.type = shape_met.type;
+    hit.normal = face_normal(hit.face);
+    if (!hit.starts_inside) {
+      hit.side = shape_met.side;
+      hit.face = side_direction(hit.side);
+      hit.normal = side_normal(hit.side);
+    }
   } else {
     hit.inside = ray_origin + t * ray_direction - vec3(walk_voxel - ray_base);
     hit.type = type_found();
@@ -379,7 +393,22 @@ void count_scene() {
   if (is(kIsFirst)) add_sum(kSumBackground, vec4(0.0, 0.0, 0.0, 1.0));
 }
 
+// Returns the surface of a shape's side: that of its type, with the colour of the texel of level 0.
+Surface surface_of_side(Hit hit) {
+  Surface surface = surface_of(hit.type);
+  uint flags = side_flags(hit.side);
+  if ((flags & kSideHasLook) == 0) return surface;
+  vec4 tint = shape_vector(side_index(hit.side) + 4);
+  surface.colour = tint.xyz;
+  if ((flags & kSideHasTexels) != 0) {
+    surface.colour *= linear_from_srgb(unpackUnorm4x8(side_texel(hit.side, hit.inside)).xyz);
+  }
+  surface.emitted = surface.colour * tint.w;
+  return surface;
+}
+
 Surface surface_met(Hit hit) {
+  if (kHasShapes && hit.in_shape) return surface_of_side(hit);
   if (!hit.in_field) return surface_of(hit.type);
   if (hit.starts_inside) return surface_of_material(hit.type);
   Tree field = opaque_tree(placed_at(hit.voxel.w), 1);
@@ -414,7 +443,8 @@ uint hit_matter(Hit hit, vec3 origin) {
     return kEnds;
   }
   vertex.is_ground = vertex.is_medium = false;
-  put_on_surface(hit.voxel, hit.in_field ? hit.inside : put_on_face(hit.inside, hit.face), hit.normal);
+  bool is_on_face = !hit.in_field && !(kHasShapes && hit.in_shape);
+  put_on_surface(hit.voxel, is_on_face ? put_on_face(hit.inside, hit.face) : hit.inside, hit.normal);
   vertex.colour = surface.colour;
   vertex.roughness = surface.roughness;
   vertex.metalness = surface.metalness;
@@ -425,8 +455,10 @@ uint hit_matter(Hit hit, vec3 origin) {
               hit.in_field, vertex.normal, vertex.in_view);
   }
   note_layers(hit.t + behind, hit.type);
-  if (!is_black(surface.emitted)) {
-    int lamp = hit.in_field ? -1 : lamp_of_face(hit.voxel.w, voxel, hit.face);
+  // The lamps stand for cubes: of a shape, they give all light that paths between surfaces could find.
+  bool is_lamp_seen = !kHasShapes || !hit.in_shape || is(kIsSeen) || path_frame().lamp_count == 0;
+  if (!is_black(surface.emitted) && is_lamp_seen) {
+    int lamp = is_on_face ? lamp_of_face(hit.voxel.w, voxel, hit.face) : -1;
     add_emitted(surface.emitted, lamp, origin, hit.t);
   }
   return kScatters;
@@ -654,7 +686,7 @@ void step_path() {
       bool has_first = false;
       bool has_next = false;
       while (glass.outcome == kGoesOn && !has_next && next_body(list, k, body)) {
-        Surface surface = surface_of(body.what.x);
+        Surface surface = surface_of_body(body);
         if (!is_own) {
           passed *= passed_by(surface, body.lengths.z, has_own_length(body));
         } else if (!is(kIsSeen) || (path.more.x == 0 && !has_first && surface.scattering > 0.0)) {

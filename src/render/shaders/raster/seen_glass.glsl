@@ -35,7 +35,7 @@ float opaque_behind() {
 // in the world; `diffuse`: of the sun.
 LitPoint point_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
   uint face = body.what.y;
-  Surface surface = surface_of(body.what.x);
+  Surface surface = surface_of_body(body);
   if (has(kDetailColours)) {
     surface.colour = placed.detail_colour.xyz;
     surface.emitted = vec3(0.0);
@@ -43,7 +43,13 @@ LitPoint point_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
   // From inside, only its emission is visible.
   if ((body.what.z & kStartsInside) != 0) surface.colour = vec3(0.0);
   GridRay ray = seen_ray_in(body.voxel.w, placed);
-  vec3 inside = vec3(ray.base - body.voxel.xyz) + ray.origin + body.lengths.w * ray.direction;
+  vec3 inside = vec3(ray.base - body.voxel.xyz) + ray.origin + body.lengths.x * ray.direction;
+  if (kHasShapes && (body.what.z & kBeginsInShape) != 0) {
+    vec3 in_grid = side_normal(body.what.y);
+    vec3 above = vec3(body.voxel.xyz & 63) + inside + frame().lift / placed.ref_view.w * in_grid;
+    LevelPlace at = LevelPlace(body.voxel.xyz, inside, in_grid, -1);
+    return LitPoint(body.voxel, body.voxel.xyz & ~63, above, normal, diffuse, surface.colour, surface.emitted, 1.0, at);
+  }
   if (kHasFieldGlass && (body.what.z & kBeginsInField) != 0) {
     vec3 above = inside + frame().lift / placed.ref_view.w * normal_of(body.what.y);
     vec3 from = vec3(body.voxel.xyz & 63) + above;

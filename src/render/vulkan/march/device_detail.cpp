@@ -99,6 +99,7 @@ Status DeviceDetail::put_halved(const DeviceScene& device, const Scene& scene,
     if (found == nullptr) continue;
     const Level* level = nullptr;
     if (Status done = put_level(*found, grid, table, level); !done) return done;
+    placement.has_transparent |= level->voxels.has_transparent();  // shapes are cubes there
     put_in(*found, scene.grids()[grid], level->voxels, level->index, *next);
     halved.push_back(
         {static_cast<std::size_t>(next - placement.placed.begin()), bounds_in_world(next->placed, found->tight)});

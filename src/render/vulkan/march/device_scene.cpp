@@ -8,10 +8,13 @@
 #include <cstring>
 #include <utility>
 
+#include <glm/geometric.hpp>
+
 #include <quoin/core/assert.h>
 #include <quoin/core/memory.h>
 
 #include "scene/surfaces.h"
+#include "scene/tracer/shape_rays.h"
 
 namespace quoin::vulkan {
 namespace {
@@ -34,6 +37,31 @@ bool is_too_wide(const IBox& bounds) {
 // Returns the bounds of voxels and field.
 IBox content_bounds(const SceneGrid& grid) {
   return unite(grid.grid.bounds(), grid.field.bounds());
+}
+
+// Appends numbers as bits.
+void add_numbers(std::uint32_t x, std::uint32_t y, std::uint32_t z, std::uint32_t w, std::vector<Vec4>& out) {
+  out.emplace_back(std::bit_cast<float>(x), std::bit_cast<float>(y), std::bit_cast<float>(z), std::bit_cast<float>(w));
+}
+
+// Returns the flags of a side; see shapes.glsl. `look`: null if it has the type's colour.
+std::uint32_t side_flags(const ModelFace& face, const VoxelFace* look, const VoxelProperties& type) {
+  const bool has_texels = look != nullptr && !look->texture.is_null();
+  std::uint32_t flags = static_cast<std::uint32_t>(face.direction) << kSideDirection;
+  if (type.visibility == Visibility::Opaque || (has_texels && look->alpha == FaceAlpha::Opaque)) flags |= kSideHides;
+  const bool is_cutout = has_texels && look->alpha == FaceAlpha::Cutout;
+  if (is_cutout && (flags & kSideHides) == 0) flags |= kSideIsCutout;
+  if (look != nullptr) flags |= kSideHasLook;
+  if (has_texels) flags |= kSideHasTexels | static_cast<std::uint32_t>(look->texture.level_count() - 1);
+  if (!has_texels || look->alpha == FaceAlpha::Translucent) flags |= kSideIsGlass;
+  if (face.on_side) flags |= kSideIsOnVoxel;
+  if (face.normal != Vec3(normal_of(face.direction))) flags |= kSideIsTilted;
+  return flags;
+}
+
+bool has_other_shapes(const TypeChanges& changes, const VoxelRegistry& types) {
+  const auto is_other = [&](const TypeChange& change) { return change.shape_changed || types.is_shaped(change.type); };
+  return changes.all || std::ranges::any_of(changes.items_unless_all(), is_other);
 }
 
 bool can_be_traced(const Scene& scene, const Instance& instance, const SceneGrid* grid, InstanceFilter filter) {
@@ -93,8 +121,16 @@ void DeviceScene::clear() {
   surface_table_.clear();
   memory_->release(grids_place_);
   memory_->release(surfaces_place_);
+  memory_->release(shapes_place_);
+  shape_table_.clear();
+  if (shapes_ != nullptr) shapes_->clear();
   surface_table_.clear();
   followed_types_ = followed_visibility_ = followed_scene_ = {};
+}
+
+IBox DeviceScene::bounds_of(const SceneGrid& grid) const {
+  const IBox bounds = content_bounds(grid);
+  return bounds.empty() ? bounds : IBox{bounds.min - shape_reach_, bounds.max + shape_reach_};
 }
 
 // Lists the instances and keeps only the known grids that they use.
@@ -105,9 +141,10 @@ void DeviceScene::place(const Scene& scene, InstanceFilter filter) {
   scene.instances().for_each([&](InstanceHandle handle, const Instance& instance) {
     const SceneGrid* grid = scene.grids().find(instance.grid);
     if (!can_be_traced(scene, instance, grid, filter)) return;
-    KnownGrid& known = grids_[instance.grid];
+    const ShapedVoxels shaped = shapes_ == nullptr ? ShapedVoxels::AsCubes : ShapedVoxels::ByShape;
+    KnownGrid& known = grids_.try_emplace(instance.grid, shaped).first->second;
     known.is_used = true;
-    known.bounds = content_bounds(*grid);
+    known.bounds = bounds_of(*grid);
     known.pivot = grid->pivot;
     placement_.placed.push_back({placed_as(instance, *grid, handle)});
     boxes.push_back(bounds_in_world(placement_.placed.back().placed, known.bounds));
@@ -133,7 +170,7 @@ std::vector<GridHandle> DeviceScene::changed_grids(const Scene& scene, InstanceF
     const auto known = grids_.find(handle);
     const SceneGrid* grid = scene.grids().find(handle);
     // An empty grid may now be placed; a grid with a moved pivot changes its position.
-    places |= known == grids_.end() || grid == nullptr || !(content_bounds(*grid) == known->second.bounds) ||
+    places |= known == grids_.end() || grid == nullptr || !(bounds_of(*grid) == known->second.bounds) ||
               grid->pivot != known->second.pivot;
     if (known != grids_.end() && grid != nullptr) changed.push_back(handle);
   }
@@ -169,22 +206,30 @@ Status DeviceScene::update_grids(const Scene& scene, const std::vector<GridHandl
     all[i].first->trees.update(all[i].second->grid, scene.types);
     all[i].first->trees.update(all[i].second->field, scene.types);
   });
+  const VoxelRegistry* const turned = shapes_ != nullptr && scene.types.has_turned_by_state() ? &scene.types : nullptr;
   for (const auto& [known, grid] : all) {
     const TreeCache& trees = known->trees;
-    Status done = known->voxels.update(
-        *memory_, {&grid->grid, &trees.opaque(), trees.transparent(), trees.opaque_field(), trees.glass()});
+    Status done =
+        known->voxels.update(*memory_, {&grid->grid, &trees.opaque(), trees.transparent(), trees.opaque_field(),
+                                        trees.glass(), trees.shapes(), shapes_.get(), turned});
     if (!done) return done;
   }
-  return {};
+  return shapes_ == nullptr ? Status{} : shapes_->send();
 }
 
 Status DeviceScene::try_update(const Scene& scene, InstanceFilter filter, Threads threads) {
-  // Packing depends on the visibility of types.
-  if (has_other_visibility(scene.types.changes_since(followed_visibility_))) {
+  // Packing depends on the visibility of types, and on all properties of shaped ones.
+  const TypeChanges types = scene.types.changes_since(followed_visibility_);
+  if (has_other_visibility(types) || (shapes_ != nullptr && has_other_shapes(types, scene.types))) {
     for (auto& [handle, grid] : grids_) grid.voxels.release(*memory_);
     grids_.clear();
     followed_scene_ = {};
+    if (shapes_ != nullptr) {
+      shapes_->clear();
+      shape_reach_ = reach_of_shapes(scene.types);
+    }
   }
+  if (shapes_ != nullptr) shapes_->use(scene.types);
   bool places = false;
   const std::vector<GridHandle> changed = changed_grids(scene, filter, places);
   if (placement_.placed.size() > kMaxInstances) {
@@ -199,6 +244,7 @@ Status DeviceScene::try_update(const Scene& scene, InstanceFilter filter, Thread
     placement_.has_transparent = any(&DeviceGrid::has_transparent);
     placement_.has_fields = any(&DeviceGrid::has_field);
     placement_.has_field_glass = any(&DeviceGrid::has_field_glass);
+    placement_.has_shapes = any(&DeviceGrid::has_shapes);
   }
   if (!scene.types.changes_since(followed_types_).empty()) {
     if (Status done = put_surfaces(scene.types); !done) return done;
@@ -215,10 +261,138 @@ Status DeviceTexels::send() {
   return memory_->write(place_, std::as_bytes(all));
 }
 
+// Returns the address of a texture's texels, and adds them to `used`.
+Result<std::uint64_t> send_texels(ShaderMemory& memory, KnownTexels& all, const Texture& texture,
+                                  std::vector<std::shared_ptr<const DeviceTexels>>& used) {
+  std::weak_ptr<const DeviceTexels>& known = all[texture.level(0).data()];
+  std::shared_ptr<const DeviceTexels> found = known.lock();
+  if (found == nullptr) {
+    const auto made = std::make_shared<DeviceTexels>(memory, texture);
+    if (Status done = made->send(); !done) return done.error();
+    known = found = made;
+  }
+  if (used.empty() || used.back() != found) used.push_back(found);
+  return found->address();
+}
+
 void DeviceTextures::clear() {
   texels_.clear();
   memory_->release(numbers_);
   memory_->release(faces_);
+  std::erase_if(*known_, [](const auto& each) { return each.second.expired(); });
+}
+
+Result<ShaderShape> DeviceShapes::shape_of(const PlacedShape& shape) {
+  QUOIN_ASSERT(types_ != nullptr, "the types of the shapes");
+  const VoxelProperties& type = (*types_)[shape.type];
+  const auto known = models_.find({shape.model, shape.type});
+  const Result<std::uint32_t> model =
+      known != models_.end() ? Result<std::uint32_t>(known->second) : add(*shape.model, type);
+  if (!model) return model.error();
+  if (known == models_.end()) models_[{shape.model, shape.type}] = *model;
+  const std::uint32_t opaque = type.visibility == Visibility::Opaque ? kShapeIsOpaque : 0;
+  return ShaderShape{shape.type | opaque, *model};
+}
+
+// Appends a model to the table. Returns its index.
+Result<std::uint32_t> DeviceShapes::add(const ShapeModel& model, const VoxelProperties& type) {
+  constexpr std::size_t kMost = std::size_t{1} << 30;  // a bit is a flag in shaders
+  const std::size_t begin = vectors_.size();
+  if (begin > kMost) return make_error(ErrorCode::LimitExceeded, "vulkan: too many models of shapes");
+  const auto first = static_cast<std::uint32_t>(begin);
+  QUOIN_ASSERT(model.free_faces <= model.faces.size(), "free sides among the sides");
+  const auto plain = static_cast<std::uint32_t>(model.faces.size()) - model.free_faces;
+  vectors_.resize(begin + 2);
+  add_boxes(model);
+  const auto sides = static_cast<std::uint32_t>(vectors_.size());
+  for (const ModelFace& face : model.faces) {
+    if (Status done = add_side(face, model, type); !done) return done.error();
+  }
+  const auto corners = static_cast<std::uint32_t>(vectors_.size());
+  for (std::size_t i = plain; i < model.faces.size(); ++i) {
+    for (const Vec3& corner : model.faces[i].corners) vectors_.emplace_back(corner, 0.0F);
+  }
+  std::vector<Vec4> head;
+  add_numbers(static_cast<std::uint32_t>(model.boxes.size()), sides, plain, model.free_faces, head);
+  add_numbers(corners, 0, 0, 0, head);
+  std::ranges::copy(head, vectors_.begin() + first);
+  return first;
+}
+
+// Appends the boxes of the model that begins two vectors before the end, then their turns.
+void DeviceShapes::add_boxes(const ShapeModel& model) {
+  auto turn = static_cast<std::uint32_t>(2 + kBoxVectors * model.boxes.size());
+  for (const ModelBox& box : model.boxes) {
+    vectors_.emplace_back(box.min, std::bit_cast<float>(box.is_turned ? turn : 0U));
+    vectors_.emplace_back(box.max, 0.0F);
+    std::array<std::uint32_t, 4> sides{};
+    for (std::size_t i = 0; i < box.faces.size(); ++i) {
+      const std::uint32_t number = box.faces[i] < 0 ? kNoSide : static_cast<std::uint32_t>(box.faces[i]);
+      sides[i / 2] |= number << (16 * (i % 2));
+    }
+    add_numbers(sides[0], sides[1], sides[2], 0, vectors_);
+    if (box.is_turned) turn += 4;
+  }
+  for (const ModelBox& box : model.boxes) {
+    if (!box.is_turned) continue;
+    vectors_.emplace_back(box.origin, 0.0F);
+    for (const Vec3& row : box.inverse) vectors_.emplace_back(row, 0.0F);
+  }
+}
+
+Status DeviceShapes::add_side(const ModelFace& face, const ShapeModel& model, const VoxelProperties& type) {
+  const VoxelFace* const look = look_of(model, face, type.faces);
+  const DVec3 corner(face.corners[0]);
+  vectors_.push_back(to_vec4(DVec3(face.normal), glm::dot(DVec3(face.normal), corner)));
+  std::uint64_t address = 0;
+  std::array<Vec4, 2> along{Vec4(0.0F), Vec4(0.0F)};
+  float density = 1.0F;
+  if (look != nullptr && !look->texture.is_null()) {
+    const auto sent = send_texels(*memory_, *known_, look->texture, texels_);
+    if (!sent) return sent.error();
+    address = *sent;
+    const ShapeUv begin = shape_uv(face, *look, corner);
+    density = static_cast<float>(begin.square_density);
+    for (std::size_t i = 0; i < 2; ++i) {
+      DVec3 slope(0.0);
+      for (int axis = 0; axis < 3; ++axis) {
+        DVec3 step(0.0);
+        step[axis] = 1.0;
+        slope[axis] = double{shape_uv(face, *look, corner + step).uv[i]} - double{begin.uv[i]};
+      }
+      along[i] = to_vec4(slope, double{begin.uv[i]} - glm::dot(slope, corner));
+    }
+  }
+  vectors_.insert(vectors_.end(), along.begin(), along.end());
+  add_numbers(static_cast<std::uint32_t>(address), static_cast<std::uint32_t>(address >> 32),
+              side_flags(face, look, type), std::bit_cast<std::uint32_t>(density), vectors_);
+  vectors_.emplace_back(look == nullptr ? Vec3(1.0F) : linear_colour(look->tint), emission_of(type));
+  return {};
+}
+
+Status DeviceShapes::send() {
+  if (sent_ == vectors_.size()) return {};
+  if (vectors_.size() * sizeof(Vec4) > place_.size) {
+    memory_->release(place_);
+    sent_ = 0;
+    // Half as much again, as for trees.
+    const std::size_t bytes = vectors_.size() * sizeof(Vec4);
+    const auto place = memory_->allocate(bytes + bytes / 2, "uploading shapes");
+    if (!place) return place.error();
+    place_ = *place;
+  }
+  const auto added = std::span(vectors_).subspan(sent_);
+  const std::size_t offset = std::exchange(sent_, vectors_.size()) * sizeof(Vec4);
+  return memory_->write(place_, std::as_bytes(added), offset);
+}
+
+void DeviceShapes::clear() {
+  models_.clear();
+  vectors_.clear();
+  sent_ = 0;
+  texels_.clear();
+  memory_->release(place_);
+  types_ = nullptr;
   std::erase_if(*known_, [](const auto& each) { return each.second.expired(); });
 }
 
@@ -242,20 +416,6 @@ Status DeviceTextures::put(const VoxelRegistry& types) {
   return done;
 }
 
-// Returns the address of a texture's texels, and adds them to `used`.
-Result<std::uint64_t> DeviceTextures::send(const Texture& texture,
-                                           std::vector<std::shared_ptr<const DeviceTexels>>& used) {
-  std::weak_ptr<const DeviceTexels>& known = (*known_)[texture.level(0).data()];
-  std::shared_ptr<const DeviceTexels> found = known.lock();
-  if (found == nullptr) {
-    const auto made = std::make_shared<DeviceTexels>(*memory_, texture);
-    if (Status done = made->send(); !done) return done.error();
-    known = found = made;
-  }
-  if (used.empty() || used.back() != found) used.push_back(found);
-  return found->address();
-}
-
 Status DeviceTextures::try_put(const VoxelRegistry& types) {
   std::vector<std::uint32_t> numbers(types.size() + 1);
   std::vector<ShaderTexturedFace> faces;
@@ -265,12 +425,15 @@ Status DeviceTextures::try_put(const VoxelRegistry& types) {
     if (type.faces.empty() || type.visibility != Visibility::Opaque) continue;
     const std::array<std::uint32_t, 6> rule = words_of(TriplanarRule(type.field_textures));
     for (const Direction direction : kDirections) {
-      const auto address = send(type.faces[direction].texture, used);
+      const auto address = send_texels(*memory_, *known_, type.faces[direction].texture, used);
       if (!address) return address.error();
       faces.push_back(shader_face(face_texels(type.faces[direction], direction, emission_of(type)), *address));
       faces.back().on_fields = rule[static_cast<std::size_t>(direction)];
     }
     numbers[i] = static_cast<std::uint32_t>(faces.size() / kDirections.size());
+    QUOIN_ASSERT(numbers[i] <= kTextureNumber, "a number per type");
+    if (type.orientations.empty()) continue;
+    numbers[i] |= kIsTurnedByState | state_turn(type.orientations, 0) << kTextureTurn;
   }
   texels_ = std::move(used);
   if (faces.empty()) {
@@ -355,6 +518,7 @@ std::vector<LampPlace> DeviceScene::lamp_places(const Scene& scene) const {
     QUOIN_ASSERT(found != grids_.end(), "the scene of the last update");
     const TreeCache& trees = found->second.trees;
     places.push_back(lamp_place(scene, each.placed, trees.opaque(), trees.transparent(), trees.field()));
+    if (trees.shapes() != nullptr) places.back().shapes = &trees.shapes()->touched;
   }
   return places;
 }
@@ -409,7 +573,27 @@ Status DeviceScene::put_grids() {
     if (Status done = put_table(*memory_, grids_place_, bytes_of(grid_table_)); !done) return done;
   }
   placement_.grids = grids_place_.address;
-  return {};
+  return put_shape_table();
+}
+
+Status DeviceScene::put_shape_table() {
+  std::vector<ShaderShapes> table;
+  for (const auto& [handle, grid] : grids_) {
+    if (placement_.has_shapes) table.push_back(grid.voxels.shader_shapes());
+  }
+  const auto bytes = bytes_of(table);
+  const bool is_known = table.size() == shape_table_.size() &&
+                        (table.empty() || std::memcmp(table.data(), shape_table_.data(), bytes.size()) == 0);
+  if (is_known) return {};
+  shape_table_ = std::move(table);
+  return shape_table_.empty() ? Status{} : put_table(*memory_, shapes_place_, bytes_of(shape_table_));
+}
+
+void DeviceScene::put_shapes_in(ShaderFrame& frame) const {
+  if (shapes_ == nullptr || shape_table_.empty()) return;
+  frame.shape_grids = shapes_place_.address;
+  frame.shaped_grids = static_cast<std::uint32_t>(shape_table_.size());
+  frame.shape_models = shapes_->address();
 }
 
 }  // namespace quoin::vulkan

@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <quoin/scene/scene.h>
@@ -48,7 +49,8 @@ struct Placement {
   bool has_transparent = false;
   bool has_fields = false;
   bool has_field_glass = false;  ///< any field has a transparent part
-  std::vector<ShaderFar> far;    ///< visible faces of impostors, in the order of the instances
+  bool has_shapes = false;
+  std::vector<ShaderFar> far;  ///< visible faces of impostors, in the order of the instances
 };
 /// Writes a table to its place, or to a larger place.
 [[nodiscard]] Status put_table(ShaderMemory& memory, Place& place, std::span<const std::byte> bytes);
@@ -80,6 +82,9 @@ class DeviceTexels {
 
 /// Finds textures in device memory, so that a renderer and its mesh renderers hold each texture once.
 using KnownTexels = std::map<const Rgba8*, std::weak_ptr<const DeviceTexels>>;
+/// Sends a texture unless it is known, and adds it to `used`. Returns the address of its texels.
+[[nodiscard]] Result<std::uint64_t> send_texels(ShaderMemory& memory, KnownTexels& all, const Texture& texture,
+                                                std::vector<std::shared_ptr<const DeviceTexels>>& used);
 
 /// The textures of opaque types in device memory: texels, and a table of faces. Shaders follow the addresses of texels,
 /// so there are no limits of layers, sizes or numbers, except the memory.
@@ -103,8 +108,6 @@ class DeviceTextures {
  private:
   void clear();
   Status try_put(const VoxelRegistry& types);
-  [[nodiscard]] Result<std::uint64_t> send(const Texture& texture,
-                                           std::vector<std::shared_ptr<const DeviceTexels>>& used);
 
   ShaderMemory* memory_;
   KnownTexels* known_;
@@ -112,6 +115,41 @@ class DeviceTextures {
   std::vector<std::shared_ptr<const DeviceTexels>> texels_;
   Place numbers_;
   Place faces_;
+};
+
+/// The models of shapes in device memory: boxes, free sides, and the looks of all sides with their texels. A model is
+/// sent once per type that uses it, and stays until `clear`.
+class DeviceShapes final : public ShapeModels {
+ public:
+  /// Lifetime: `memory` and `known` must outlive it.
+  DeviceShapes(ShaderMemory& memory, KnownTexels& known) : memory_(&memory), known_(&known) {}
+  ~DeviceShapes() override { clear(); }
+  DeviceShapes(const DeviceShapes&) = delete;
+  DeviceShapes& operator=(const DeviceShapes&) = delete;
+
+  /// Sets the types of the shapes to come. Lifetime: `types` must outlive the calls of `shape_of`.
+  /// Requires: the shaped types are those of the last call; else call `clear`.
+  void use(const VoxelRegistry& types) { types_ = &types; }
+  [[nodiscard]] Result<ShaderShape> shape_of(const PlacedShape& shape) override;
+  /// Queues the models since the last call. After an error it must be cleared.
+  [[nodiscard]] Status send();
+  void clear();
+  /// Returns the address of the table of vectors.
+  [[nodiscard]] std::uint64_t address() const { return place_.address; }
+
+ private:
+  [[nodiscard]] Result<std::uint32_t> add(const ShapeModel& model, const VoxelProperties& type);
+  void add_boxes(const ShapeModel& model);
+  Status add_side(const ModelFace& face, const ShapeModel& model, const VoxelProperties& type);
+
+  ShaderMemory* memory_;
+  KnownTexels* known_;
+  const VoxelRegistry* types_ = nullptr;
+  std::map<std::pair<const ShapeModel*, VoxelType>, std::uint32_t> models_;
+  std::vector<Vec4> vectors_;
+  std::size_t sent_ = 0;  // vectors
+  Place place_;
+  std::vector<std::shared_ptr<const DeviceTexels>> texels_;
 };
 
 /// A table of lamps, its bricks and lists in device memory.
@@ -146,7 +184,11 @@ struct DeviceLight {
 /// A scene's voxels in device memory, and its instances.
 class DeviceScene {
  public:
+  /// Makes a scene whose voxels with shapes are cubes.
   explicit DeviceScene(ShaderMemory& memory) : memory_(&memory) {}
+  /// Makes a scene with shapes. Lifetime: `texels` must outlive it.
+  DeviceScene(ShaderMemory& memory, KnownTexels& texels)
+      : memory_(&memory), shapes_(std::make_unique<DeviceShapes>(memory, texels)) {}
 
   /// As VulkanRenderer::update. After an error it is empty.
   [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter, Threads threads);
@@ -159,12 +201,16 @@ class DeviceScene {
   [[nodiscard]] const std::vector<ShaderGrid>& grid_table() const { return grid_table_; }
   [[nodiscard]] std::uint64_t surfaces_address() const { return surfaces_place_.address; }
   [[nodiscard]] std::uint32_t last_surface() const { return last_surface_; }
+  /// Sets the addresses of the shapes in a frame.
+  void put_shapes_in(ShaderFrame& frame) const;
   /// Returns true if some opaque types do not darken corners.
   [[nodiscard]] bool has_unoccluding() const { return has_unoccluding_; }
 
  private:
   struct KnownGrid {
-    IBox bounds;
+    explicit KnownGrid(ShapedVoxels shaped) : trees(shaped) {}
+
+    IBox bounds;  // of the content, and of voxels that shapes may reach
     DVec3 pivot{0.0};
     bool is_used = false;  // by an instance
     TreeCache trees;
@@ -179,8 +225,12 @@ class DeviceScene {
   Status try_update(const Scene& scene, InstanceFilter filter, Threads threads);
   Status put_surfaces(const VoxelRegistry& types);
   Status put_grids();
+  Status put_shape_table();
+  [[nodiscard]] IBox bounds_of(const SceneGrid& grid) const;
 
   ShaderMemory* memory_;
+  std::unique_ptr<DeviceShapes> shapes_;  // null: shaped voxels are cubes
+  int shape_reach_ = 0;                   // how far shapes reach outside their voxels, in voxels, rounded up
   std::map<GridHandle, KnownGrid> grids_;
   ChangeCursor followed_types_;
   ChangeCursor followed_visibility_;
@@ -189,6 +239,8 @@ class DeviceScene {
   Placement placement_;
   Place grids_place_;
   std::vector<ShaderGrid> grid_table_;
+  Place shapes_place_;
+  std::vector<ShaderShapes> shape_table_;  // empty without shapes
   Place surfaces_place_;
   std::vector<Vec4> surface_table_;
   std::uint32_t last_surface_ = 0;

@@ -89,7 +89,8 @@ VkResult Pipelines::make(Pass pass, const PassFeatures& features) {
   // Passes of one shader differ in its constants.
   const bool is_second = pass == Pass::LightWithGlass || pass == Pass::FarFaces;
   const std::array constants = {ShaderConstant{0, is_second}, ShaderConstant{4, used.fields},
-                                ShaderConstant{6, used.field_glass}, ShaderConstant{7, used.textures}};
+                                ShaderConstant{6, used.field_glass}, ShaderConstant{7, used.textures},
+                                ShaderConstant{8, used.shapes}};
   return make_compute_pipeline(*device_, layout_, code_of(pass), constants, pipeline);
 }
 

@@ -36,7 +36,7 @@ struct VulkanRenderer::Impl {
       : device(std::move(of_device)),
         pipelines(std::move(with_pipelines)),
         memory(*device, block_bytes),
-        scene(memory),
+        scene(memory, texels),
         textures(memory, texels),
         detail(memory) {}
 
@@ -59,8 +59,8 @@ struct VulkanRenderer::Impl {
   std::unique_ptr<vulkan::Device> device;
   std::unique_ptr<vulkan::Pipelines> pipelines;
   vulkan::DeviceMemory memory;
-  vulkan::DeviceScene scene;
   vulkan::KnownTexels texels;  ///< of this renderer and its mesh renderers
+  vulkan::DeviceScene scene;
   vulkan::DeviceTextures textures;
   vulkan::DeviceDetail detail;
   /// The source of levels of detail, as of the last update; null before the first.

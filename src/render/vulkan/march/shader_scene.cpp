@@ -279,6 +279,7 @@ void put_scene(const DeviceScene& scene, const Placement& placement, FrameData& 
   data.frame.grids = placement.grids;
   data.frame.last_surface = scene.last_surface();
   data.frame.surfaces = scene.surfaces_address();
+  scene.put_shapes_in(data.frame);
   if (scene.has_unoccluding()) data.frame.flags |= kUnoccluding;
 }
 

@@ -16,6 +16,7 @@
 #include <gtest/gtest.h>
 
 #include "core/death_for_tests.h"
+#include "grid/shapes/shape_types_for_tests.h"
 #include "render/cpu/render_test_support.h"
 #include "render/vulkan/march/device_scene.h"
 #include "render/vulkan/trees/tree_packing.h"
@@ -356,6 +357,82 @@ TEST(DeviceTextures, TakesMemoryOfTexels) {
   ASSERT_TRUE(textures.put(types));
   EXPECT_GE(memory.bytes().size(), set.bytes());
   EXPECT_LE(memory.bytes().size(), set.bytes() + set.bytes() / 100);
+}
+
+// Shapes in two distant chunks, textured and with glass.
+Scene scene_with_shapes(const ShapeTypes& types, Scene scene) {
+  VoxelProperties slab = textured(grey(16, 20));
+  slab.shapes = VoxelShape::box({0, 0, 0}, {16, 8, 16});
+  const VoxelType type = *scene.types.add(slab);
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {3, 1, 3}}, type);
+  grid.fill_box({{0, 1, 0}, {3, 2, 1}}, types.pane);
+  grid.fill_box({{300, 0, 0}, {303, 1, 1}}, types.fence);
+  render_test::place(scene, std::move(grid));
+  return scene;
+}
+
+TEST(DeviceScene, IsEmptyAfterFailedUpdateOfShapes) {
+  Scene types_only;
+  const ShapeTypes types(types_only.types);
+  const Scene scene = scene_with_shapes(types, types_only);
+  int allocations = 0;
+  for (const bool throws : {false, true}) {
+    for (int successes = 0;; ++successes) {
+      QueuedMemory memory;
+      memory.left = successes;
+      memory.throws = throws;
+      vulkan::KnownTexels known;
+      vulkan::DeviceScene device(memory, known);
+      Status done;
+      try {
+        done = device.update(scene, InstanceFilter::Visible, 1);
+      } catch (const std::bad_alloc&) {
+        done = make_error(ErrorCode::LimitExceeded, "thrown");
+      }
+      if (done) {
+        allocations = successes;
+        break;
+      }
+      EXPECT_EQ(done.error().code, ErrorCode::LimitExceeded);
+      EXPECT_EQ(memory.held, 0) << successes;
+      EXPECT_EQ(memory.queued, 0) << successes;
+      EXPECT_TRUE(known.empty());
+      memory.left = -1;
+      ASSERT_TRUE(device.update(scene, InstanceFilter::Visible, 1));
+      EXPECT_TRUE(device.placement().has_shapes);
+      EXPECT_TRUE(device.placement().has_transparent);
+    }
+    EXPECT_GT(allocations, 10);
+  }
+}
+
+TEST(DeviceScene, SendsShapesOfChangedChunks) {
+  Scene types_only;
+  const ShapeTypes types(types_only.types);
+  Scene scene = scene_with_shapes(types, types_only);
+  QueuedMemory memory;
+  vulkan::KnownTexels known;
+  vulkan::DeviceScene device(memory, known);
+  ASSERT_TRUE(device.update(scene, InstanceFilter::Visible, 1));
+  const int all = memory.flushed;
+  EXPECT_EQ(known.size(), 1U);
+  ASSERT_TRUE(device.update(scene, InstanceFilter::Visible, 1));
+  EXPECT_EQ(memory.flushed, 0);
+  const GridHandle grid = scene.grids().handles().front();
+  ASSERT_TRUE(scene.edit(grid).grid.set_data({301, 0, 0}, {.state = 1}));
+  ASSERT_TRUE(device.update(scene, InstanceFilter::Visible, 1));
+  EXPECT_GT(memory.flushed, 0);
+  EXPECT_LT(memory.flushed, all / 2);
+  scene.edit(grid).grid.fill_box({{0, 0, 0}, {303, 2, 3}}, types.stone);
+  ASSERT_TRUE(device.update(scene, InstanceFilter::Visible, 1));
+  EXPECT_FALSE(device.placement().has_shapes);
+  EXPECT_FALSE(device.placement().has_transparent);
+  // Scenes for other shaders show cubes.
+  vulkan::DeviceScene cubes(memory);
+  ASSERT_TRUE(cubes.update(scene_with_shapes(types, types_only), InstanceFilter::Visible, 1));
+  EXPECT_FALSE(cubes.placement().has_shapes);
+  EXPECT_TRUE(cubes.placement().has_transparent);
 }
 
 TEST(ShaderBytesDeathTest, RejectsWriteBeyondPlace) {

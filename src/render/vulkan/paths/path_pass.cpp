@@ -176,8 +176,8 @@ namespace quoin::vulkan {
 
 using PathImageImpl = VulkanPathImage::Impl;
 
-// The path tracing shader in the variants that scenes need: with glass, with fields, with transparent fields. Each
-// variant is created at first use.
+// The path tracing shader in the variants that scenes need: with glass, with fields, with transparent fields, with
+// shapes. Each variant is created at first use.
 class PathPipelines {
  public:
   [[nodiscard]] static Result<std::unique_ptr<PathPipelines>> create(Device& device);
@@ -196,7 +196,7 @@ class PathPipelines {
 
   Device* device_;
   VkPipelineLayout layout_ = VK_NULL_HANDLE;
-  std::array<VkPipeline, 8> pipelines_{};
+  std::array<VkPipeline, 16> pipelines_{};
 };
 
 namespace {
@@ -208,6 +208,7 @@ constexpr std::uint32_t kPaths[] = {
 constexpr std::size_t kGlass = 1;
 constexpr std::size_t kFields = 2;
 constexpr std::size_t kFieldGlass = 4;
+constexpr std::size_t kShapes = 8;
 
 }  // namespace
 
@@ -228,15 +229,15 @@ PathPipelines::~PathPipelines() {
 
 std::size_t PathPipelines::variant_of(const Placement& placement) {
   return (placement.has_transparent ? kGlass : 0) | (placement.has_fields ? kFields : 0) |
-         (placement.has_field_glass ? kFieldGlass : 0);
+         (placement.has_field_glass ? kFieldGlass : 0) | (placement.has_shapes ? kShapes : 0);
 }
 
 Status PathPipelines::prepare(const Placement& placement) {
   const std::size_t variant = variant_of(placement);
   if (pipelines_[variant] != VK_NULL_HANDLE) return {};
-  const std::array constants = {ShaderConstant{0, (variant & kGlass) != 0},
-                                ShaderConstant{4, (variant & (kFields | kFieldGlass)) != 0},
-                                ShaderConstant{6, (variant & kFieldGlass) != 0}};
+  const std::array constants = {
+      ShaderConstant{0, (variant & kGlass) != 0}, ShaderConstant{4, (variant & (kFields | kFieldGlass)) != 0},
+      ShaderConstant{6, (variant & kFieldGlass) != 0}, ShaderConstant{8, (variant & kShapes) != 0}};
   const VkResult result = make_compute_pipeline(*device_, layout_, kPaths, constants, pipelines_[variant]);
   return device_->check(result, "compiling shaders");
 }
@@ -404,6 +405,7 @@ Status PathPass::put_frame(int samples) {
   frame.grids = placement.grids;
   frame.surfaces = renderer_->paths->tables.surfaces_address();
   frame.last_surface = renderer_->paths->tables.last_surface();
+  renderer_->scene.put_shapes_in(frame);
   done = put_lamps(view_origin, paths);
   if (done) done = places_.upload(data.placed, frame.placed);
   if (done) done = places_.upload(data.tree, frame.tree);

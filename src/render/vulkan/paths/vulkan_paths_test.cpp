@@ -12,6 +12,7 @@
 #include <quoin/render/path_tracer.h>
 
 #include "core/work/nightly_for_tests.h"
+#include "grid/shapes/shape_types_for_tests.h"
 #include "render/cpu/environment_for_tests.h"
 #include "render/path/town_for_tests.h"
 #include "render/vulkan/device/vulkan_for_tests.h"
@@ -244,6 +245,28 @@ TEST_F(VulkanPaths, MatchCpuThroughManyPanes) {
   options.width = options.height = 24;
   physical_in(options).sky.model = SkyModel::Uniform;
   expect_same_light(scene, towards({0.0, 0.0, 100.0}, {0.0, 0.0, 0.0}), options, "panes");
+}
+
+// Nightly only: its shader takes half a minute to compile.
+TEST_F(VulkanPaths, MatchCpuOnShapes) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
+  Scene scene;
+  const ShapeTypes types(scene.types);
+  VoxelProperties textured{.name = "textured"};
+  textured.faces = render_test::random_faces(5);
+  textured.shapes = VoxelShape::box({2, 0, 2}, {14, 12, 14});
+  const VoxelType box = *scene.types.add(textured);
+  Grid grid;
+  grid.fill_box({{-8, -1, -8}, {9, 0, 9}}, types.stone);
+  for (int i = -4; i < 5; ++i) grid.set({i, 0, -3}, types.fence);
+  for (std::uint32_t i = 0; i < 8; ++i) grid.set({static_cast<int>(i) - 4, 0, -1}, types.stairs, {.state = i});
+  grid.fill_box({{-3, 0, 1}, {0, 1, 3}}, types.water);
+  grid.fill_box({{1, 0, 2}, {4, 2, 3}}, types.pane);
+  grid.fill_box({{1, 0, 1}, {3, 1, 2}}, box);
+  grid.set({-4, 0, 2}, types.torch);
+  grid.set({4, 1, 1}, types.beam);
+  place(scene, std::move(grid));
+  expect_same_light(scene, towards({4.0, 4.0, 7.0}, {0.0, 0.0, 0.0}), small(), "shapes", 0.02);
 }
 
 // A distant camera, whose view space begins in front of the scene; also far from the world's origin.

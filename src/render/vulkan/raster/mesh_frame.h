@@ -96,6 +96,7 @@ struct MeshFrameData {
   std::size_t glass_quads = 0;
   bool has_smooth_glass = false;
   bool has_fields = false;     ///< among the placed content
+  bool has_shapes = false;     ///< among the placed content
   bool has_textures = false;   ///< colours are shown, and opaque types have textures
   bool glass_by_rays = false;  ///< only the nearest glass of a pixel is drawn, including everything visible through it
 

@@ -335,10 +335,11 @@ Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples,
     MeshLight lit = is_lit ? light : MeshLight::Plain;
     if (is_nearest_glass(step.mode)) lit = data.glass_by_rays ? MeshLight::TracedThroughGlass : light;
     const auto find = [&](MeshWay::What what, bool mirrored, VkPipeline& out) -> Status {
-      const auto found = pipelines_->pipeline(
-          {what, step.mode, mirrored, step.over == Step::Over::GlassInOrder, lit,
-           data.glass_by_rays && is_nearest_glass(step.mode), lit != MeshLight::Plain && data.has_fields,
-           what == MeshWay::What::Smooth ? is_coloured_smooth : is_coloured, samples});
+      const auto found = pipelines_->pipeline({what, step.mode, mirrored, step.over == Step::Over::GlassInOrder, lit,
+                                               data.glass_by_rays && is_nearest_glass(step.mode),
+                                               lit != MeshLight::Plain && data.has_fields,
+                                               what == MeshWay::What::Smooth ? is_coloured_smooth : is_coloured,
+                                               lit != MeshLight::Plain && data.has_shapes, samples});
       if (!found) return found.error();
       out = *found;
       return {};

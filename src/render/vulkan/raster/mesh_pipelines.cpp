@@ -215,8 +215,8 @@ VkPipelineColorBlendAttachmentState blend_of(const MeshWay& way) {
 
 // The two shader stages with their specialization constants.
 struct Stages {
-  std::array<VkBool32, 8> values;
-  std::array<VkSpecializationMapEntry, 8> entries;
+  std::array<VkBool32, 9> values;
+  std::array<VkSpecializationMapEntry, 9> entries;
   VkSpecializationInfo constants;
   std::array<VkPipelineShaderStageCreateInfo, 2> all{};
 
@@ -228,7 +228,8 @@ struct Stages {
                way.fields,
                is_nearest_glass(way.mode) ? way.mode : 0,
                way.fields && way.light == MeshLight::TracedThroughGlass,
-               way.textures},
+               way.textures,
+               way.shapes},
         constants{static_cast<std::uint32_t>(entries.size()), entries.data(), sizeof values, values.data()} {
     for (std::uint32_t i = 0; i < entries.size(); ++i) {
       entries[i] = {i, i * static_cast<std::uint32_t>(sizeof(VkBool32)), sizeof(VkBool32)};

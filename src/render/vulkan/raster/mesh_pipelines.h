@@ -32,6 +32,7 @@ struct MeshWay {
   bool glass_by_rays = false;  ///< the nearest glass includes everything visible through it
   bool fields = false;         ///< rays may meet fields
   bool textures = false;       ///< opaque surfaces show textures
+  bool shapes = false;         ///< rays may meet shapes
   std::uint32_t samples = 1;
 
   auto operator<=>(const MeshWay&) const = default;

@@ -270,12 +270,14 @@ Status VulkanMeshRenderer::Impl::put_image(const vulkan::Placement& placement, c
                                            const RenderOptions& request, Threads threads, vulkan::MeshFrameData& data) {
   data.image = vulkan::make_frame(placement, camera, request);
   data.has_fields = placement.has_fields;
+  data.has_shapes = placement.has_shapes;
   vulkan::ShaderFrame& frame = data.image.frame;
   frame.grids = placement.grids;
   frame.surfaces = surfaces.address;
   frame.last_surface = static_cast<std::uint32_t>(std::max<std::size_t>(surface_table.size() / 3, 1) - 1);
   if (has_unoccluding) frame.flags |= vulkan::kUnoccluding;
   textures.put_in(frame);
+  renderer->scene.put_shapes_in(frame);
   const bool shows_colours = !shows_values(request.light.shading) && !request.detail.colours;
   data.has_textures = shows_colours && !textures.empty();
   if (scene == nullptr || !traces_light(request)) return {};

@@ -339,6 +339,30 @@ TEST_F(VulkanTextures, MeshesOfHillsResembleCpu) {
   EXPECT_GT(differing(plain) * 8, all);
 }
 
+// Logs and furnaces, also of a type that is turned without any data.
+TEST_F(VulkanTextures, CubesTurnedByStateMatchCpu) {
+  Scene scene;
+  VoxelProperties furnace{.name = "furnace", .state_bits = 3};
+  furnace.faces = random_faces(11);
+  furnace.orientations = StateOrientations::about_y_and_upside_down();
+  const VoxelType turned = *scene.types.add(furnace);
+  furnace.name = "fallen";
+  furnace.orientations = {.by_value = {AxisOrientation::quarter_turns(0, 1), AxisOrientation::quarter_turns(2, 1)}};
+  const VoxelType fallen = *scene.types.add(furnace);
+  SceneGrid blocks;
+  for (std::uint32_t i = 0; i < 8; ++i) blocks.grid.set({static_cast<int>(i) - 4, 0, 0}, turned, {.state = i});
+  blocks.grid.fill_box({{-4, -2, -2}, {4, 0, 3}}, fallen);
+  blocks.grid.set_data({1, -1, 2}, {.state = 1});
+  const GridHandle grid = scene.add_grid(std::move(blocks));
+  scene.add_instance({"", grid});
+  const Camera camera = towards({4, 5, 8}, {0, 0, 0}, 0.9);
+  const RenderOptions options = sized(160, 120);
+  compare_marched(scene, camera, options, "turned_cubes");
+  scene.edit(grid).grid.set_data({2, 0, 0}, {.state = 0});
+  scene.edit(grid).grid.set_data({2, -1, 2}, {.state = 1});
+  compare_marched(scene, camera, options, "turned_after_edits");
+}
+
 // Renderers and their mesh renderers share the texels in device memory.
 TEST_F(VulkanTextures, TexelsAreSentOnce) {
   Scene scene;

@@ -1,6 +1,7 @@
 #include "render/vulkan/trees/device_grid.h"
 
 #include <algorithm>
+#include <set>
 #include <span>
 #include <utility>
 #include <vector>
@@ -61,14 +62,21 @@ ShaderTree DeviceTree::shader_tree(const IBox& bounds, IVec3 origin) const {
 }
 
 void DeviceGrid::release(ShaderMemory& memory) {
-  for (Chunks* const chunks : {&chunks_, &field_chunks_, &glass_chunks_}) drop_all(memory, *chunks);
-  for (DeviceTree* const tree : {&opaque_, &transparent_, &field_, &glass_}) tree->release(memory);
+  for (Chunks* const chunks : {&chunks_, &field_chunks_, &glass_chunks_, &shape_chunks_, &shape_glass_chunks_}) {
+    drop_all(memory, *chunks);
+  }
+  for (DeviceTree* const tree : {&opaque_, &transparent_, &field_, &glass_, &shapes_, &shape_glass_}) {
+    tree->release(memory);
+  }
   *this = {};
 }
 
 std::uint64_t DeviceGrid::bytes() const {
-  std::uint64_t sum = opaque_.bytes() + transparent_.bytes() + field_.bytes() + glass_.bytes();
-  for (const Chunks* const chunks : {&chunks_, &field_chunks_, &glass_chunks_}) {
+  std::uint64_t sum = 0;
+  for (const DeviceTree* const tree : {&opaque_, &transparent_, &field_, &glass_, &shapes_, &shape_glass_}) {
+    sum += tree->bytes();
+  }
+  for (const Chunks* const chunks : {&chunks_, &field_chunks_, &glass_chunks_, &shape_chunks_, &shape_glass_chunks_}) {
     for (const auto& [at, chunk] : *chunks) sum += chunk.place.size;
   }
   return sum;
@@ -81,22 +89,68 @@ Status DeviceGrid::update(ShaderMemory& memory, const Content& content) {
   const auto is_same = [](const DensityGrid* now, const Chunks& chunks, const ChangeCursor& followed) {
     return now == nullptr ? chunks.empty() : !now->has_changed_since(followed);
   };
-  if (is_same(field, field_chunks_, followed_field_) && is_same(glass, glass_chunks_, followed_glass_) &&
-      !content.voxels->has_changed_since(followed_)) {
+  const std::vector<IVec3> with_other_shapes = chunks_with_other_shapes(content.shapes);
+  const bool has_turned = content.turned_types != nullptr && content.voxels->has_data_changed_since(followed_data_);
+  if (!has_turned && is_same(field, field_chunks_, followed_field_) && is_same(glass, glass_chunks_, followed_glass_) &&
+      with_other_shapes.empty() && !content.voxels->has_changed_since(followed_)) {
     return {};
   }
   Status done = update_voxels(memory, content);
   if (done) {
     done = update_field(memory, field, field_chunks_, followed_field_, [&](IVec3 chunk) {
-      return put_field(memory, field_chunks_, chunk, pack_field_chunk(content.field->cells(), *field, chunk));
+      return put_part(memory, field_chunks_, chunk, pack_field_chunk(content.field->cells(), *field, chunk));
     });
   }
   if (done) {
     done = update_field(memory, glass, glass_chunks_, followed_glass_, [&](IVec3 chunk) {
-      return put_field(memory, glass_chunks_, chunk, pack_glass_chunk(*content.glass, chunk));
+      return put_part(memory, glass_chunks_, chunk, pack_glass_chunk(*content.glass, chunk));
     });
   }
+  for (const IVec3 chunk : with_other_shapes) {
+    if (done) done = put_shapes(memory, content, chunk);
+  }
   return done ? update_tops(memory, content) : done;
+}
+
+// Returns the chunks whose shapes differ from those that were sent. `shapes`: null if there are none.
+std::vector<IVec3> DeviceGrid::chunks_with_other_shapes(const TracedShapes* shapes) const {
+  std::vector<IVec3> changed;
+  for (const auto& [chunk, sent] : sent_shapes_) {
+    if (shapes == nullptr || shapes->index.content(chunk) != sent) changed.push_back(chunk);
+  }
+  if (shapes == nullptr) return changed;
+  for (const IVec3 chunk : shapes->index.chunks()) {
+    if (!sent_shapes_.contains(chunk)) changed.push_back(chunk);
+  }
+  return changed;
+}
+
+Status DeviceGrid::put_shapes(ShaderMemory& memory, const Content& content, IVec3 chunk) {
+  sent_shapes_.erase(chunk);
+  const TracedShapes* const shapes = content.shapes;
+  auto now = shapes == nullptr ? nullptr : shapes->index.content(chunk);
+  if (now == nullptr) {
+    drop(memory, shape_chunks_, chunk);
+    drop(memory, shape_glass_chunks_, chunk);
+    return {};
+  }
+  QUOIN_ASSERT(content.models != nullptr, "models of the shapes");
+  Status done;
+  const auto shape_of = [&](const PlacedShape& shape) {
+    const auto found = content.models->shape_of(shape);
+    if (!found && done) done = found.error();
+    return found ? *found : ShaderShape{};
+  };
+  const auto all = [](const PlacedShape&) { return true; };
+  ChunkRecord record = pack_shapes_chunk(shapes->touched, shapes->index, chunk, all, shape_of);
+  if (done) done = put_part(memory, shape_chunks_, chunk, std::move(record));
+  const auto is_glass = [&](const PlacedShape& shape) {
+    return shape.type < shapes->is_glass.size() && shapes->is_glass[shape.type] != 0;
+  };
+  record = pack_shapes_chunk(shapes->glass, shapes->index, chunk, is_glass, shape_of);
+  if (done) done = put_part(memory, shape_glass_chunks_, chunk, std::move(record));
+  if (done) sent_shapes_[chunk] = std::move(now);
+  return done;
 }
 
 // Updates the nodes above the chunks.
@@ -104,7 +158,9 @@ Status DeviceGrid::update_tops(ShaderMemory& memory, const Content& content) {
   const OccupancyTree* const cells = content.field == nullptr ? nullptr : &content.field->cells();
   const OccupancyTree* const glass = content.glass == nullptr ? nullptr : &content.glass->cells();
   IBox bounds = content.voxels->bounds();
-  for (const OccupancyTree* const tree : {cells, glass}) {
+  const OccupancyTree* const shapes = content.shapes == nullptr ? nullptr : &content.shapes->touched;
+  const OccupancyTree* const shape_glass = content.shapes == nullptr ? nullptr : &content.shapes->glass;
+  for (const OccupancyTree* const tree : {cells, glass, shapes}) {
     if (tree != nullptr) bounds = unite(bounds, tree->bounds());
   }
   origin_ = chunk_of(bounds.min);
@@ -112,9 +168,13 @@ Status DeviceGrid::update_tops(ShaderMemory& memory, const Content& content) {
   if (Status done = put_top(memory, transparent_, chunks_, &DeviceChunk::transparent); !done) return done;
   if (Status done = put_top(memory, field_, field_chunks_, &DeviceChunk::field); !done) return done;
   if (Status done = put_top(memory, glass_, glass_chunks_, &DeviceChunk::glass); !done) return done;
+  if (Status done = put_top(memory, shapes_, shape_chunks_, &DeviceChunk::shapes); !done) return done;
+  if (Status done = put_top(memory, shape_glass_, shape_glass_chunks_, &DeviceChunk::shapes); !done) return done;
   shader_grid_ = {shader_tree(opaque_, content.opaque, this->origin()),
                   shader_tree(transparent_, content.transparent, this->origin()),
                   shader_tree(field_, cells, this->origin()), shader_tree(glass_, glass, this->origin())};
+  shader_shapes_ = {shader_tree(shapes_, shapes, this->origin()),
+                    shader_tree(shape_glass_, shape_glass, this->origin())};
   return {};
 }
 
@@ -126,10 +186,21 @@ Status DeviceGrid::update_voxels(ShaderMemory& memory, const Content& content) {
       if (Status done = put_voxels(memory, content, at); !done) return done;
     }
   }
-  for (const ChunkChange& change : changes->items_unless_all()) {
-    if (Status done = put_voxels(memory, content, change.chunk); !done) return done;
+  std::set<IVec3, ByPlace> chunks;
+  for (const ChunkChange& change : changes->items_unless_all()) chunks.insert(change.chunk);
+  ChangeCursor at_data = std::exchange(followed_data_, {});
+  if (content.turned_types != nullptr) {
+    const DataChanges data = content.voxels->data_changes_since(at_data);
+    for (const DataChange& change : data.items_unless_all()) chunks.insert(change.chunk);
+    if (data.all && !changes->all) {
+      for (const IVec3 at : content.voxels->chunks()) chunks.insert(at);
+    }
+  }
+  for (const IVec3 chunk : chunks) {
+    if (Status done = put_voxels(memory, content, chunk); !done) return done;
   }
   changes.commit();
+  followed_data_ = at_data;
   return {};
 }
 
@@ -169,11 +240,12 @@ Status DeviceGrid::put_voxels(ShaderMemory& memory, const Content& content, IVec
     drop(memory, chunks_, chunk);
     return {};
   }
-  return put_record(memory, chunks_[chunk], pack_chunk(*content.opaque, content.transparent, *voxels, chunk));
+  return put_record(memory, chunks_[chunk],
+                    pack_chunk(*content.opaque, content.transparent, *voxels, chunk, content.turned_types));
 }
 
-Status DeviceGrid::put_field(ShaderMemory& memory, Chunks& chunks, IVec3 chunk, ChunkRecord record) {
-  if (record.field.mask == 0 && record.glass.mask == 0) {
+Status DeviceGrid::put_part(ShaderMemory& memory, Chunks& chunks, IVec3 chunk, ChunkRecord record) {
+  if (record.field.mask == 0 && record.glass.mask == 0 && record.shapes.mask == 0) {
     drop(memory, chunks, chunk);
     return {};
   }
@@ -191,6 +263,7 @@ Status DeviceGrid::put_record(ShaderMemory& memory, DeviceChunk& entry, ChunkRec
   entry.transparent = record.transparent;
   entry.field = record.field;
   entry.glass = record.glass;
+  entry.shapes = record.shapes;
   return memory.write(entry.place, std::as_bytes(std::span(record.words)));
 }
 

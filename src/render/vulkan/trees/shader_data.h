@@ -52,6 +52,34 @@ struct ShaderGrid {
   ShaderTree glass;
 };
 
+/// The shapes of a grid, by the voxels that they touch; see shapes.glsl.
+struct ShaderShapes {
+  ShaderTree touched;
+  ShaderTree glass;  ///< of shapes with glass
+};
+
+/// A shape in the list of a voxel that it touches.
+struct ShaderShape {
+  std::uint32_t what = 0;   ///< its type, and kShapeIsOpaque; packing adds its place and kShapeIsLast
+  std::uint32_t model = 0;  ///< index in the table of vectors
+};
+constexpr std::uint32_t kShapePlace = 16;  ///< bits
+constexpr std::uint32_t kShapeIsLast = 1U << 21;
+constexpr std::uint32_t kShapeIsOpaque = 1U << 22;
+
+// The table of vectors of shapes' models: sizes, and flags of sides.
+constexpr std::uint32_t kBoxVectors = 3;
+constexpr std::uint32_t kSideVectors = 5;
+constexpr std::uint32_t kNoSide = 0xFFFF;
+constexpr std::uint32_t kSideHides = 1U << 4;
+constexpr std::uint32_t kSideIsCutout = 1U << 5;
+constexpr std::uint32_t kSideHasLook = 1U << 6;
+constexpr std::uint32_t kSideHasTexels = 1U << 7;
+constexpr std::uint32_t kSideIsGlass = 1U << 8;
+constexpr std::uint32_t kSideIsOnVoxel = 1U << 9;
+constexpr std::uint32_t kSideIsTilted = 1U << 10;
+constexpr std::uint32_t kSideDirection = 12;  ///< bits
+
 struct ShaderPlaced {
   std::array<Vec4, 3> grid_axes{};
   std::array<Vec4, 3> view_axes{};
@@ -243,7 +271,16 @@ struct ShaderFrame {
   std::uint64_t paths = 0;
   std::uint64_t texture_numbers = 0;
   std::uint64_t textured_faces = 0;
+  std::uint64_t shape_grids = 0;
+  std::uint64_t shape_models = 0;
+  std::uint32_t shaped_grids = 0;
+  std::uint32_t pad = 0;
 };
+
+// Bits of a type's entry in the table of texture numbers; see data.glsl.
+constexpr std::uint32_t kTextureNumber = 0xFFFF;
+constexpr std::uint32_t kTextureTurn = 16;  ///< first bit of `state_turn` for state 0
+constexpr std::uint32_t kIsTurnedByState = 1U << 31;
 
 /// A face of a type with textures; see data.glsl.
 struct ShaderTexturedFace {
@@ -287,10 +324,11 @@ struct SwapPush {
 };
 
 static_assert(sizeof(SwapPush) == 24);
-static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 192);
+static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 192 &&
+              sizeof(ShaderShapes) == 96);
 static_assert(sizeof(ShaderFarFace) == 32 && sizeof(ShaderVoxelFace) == 16 && sizeof(ShaderFar) == 21 * 16 &&
               sizeof(ShaderFarCell) == 128);
-static_assert(sizeof(ShaderPlaced) == 384 && sizeof(ShaderFrame) == 20 * 16 + 28 * 8 + 20 * 4);
+static_assert(sizeof(ShaderPlaced) == 384 && sizeof(ShaderFrame) == 20 * 16 + 30 * 8 + 22 * 4);
 static_assert(sizeof(ShaderLamp) == 13 * 16 && sizeof(ShaderTexturedFace) == 32);
 static_assert(sizeof(ShaderPush) == 104 && sizeof(ShaderCounters) == 16);
 

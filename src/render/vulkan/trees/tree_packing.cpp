@@ -153,13 +153,28 @@ class RecordWriter {
     });
   }
 
-  void add_types(const Chunk& voxels) {
+  Node add_shapes(const OccupancyTree& cells, const ShapeIndex& index, IVec3 chunk,
+                  FunctionRef<bool(const PlacedShape&)> with, FunctionRef<ShaderShape(const PlacedShape&)> shape_of) {
+    const trace::TreeNodes nodes(cells);
+    const trace::ChunkNode* node = nodes.find_chunk(chunk);
+    if (node == nullptr) return {};
+    ShapeIndex::Reader reader(index);
+    const auto never = [](IVec3) { return false; };
+    return add_cells(nodes, *node, never, [&](std::size_t, std::size_t, IVec3 word) {
+      return add_lists(reader, chunk * kChunkEdge + word, with, shape_of);
+    });
+  }
+
+  // `types`: see pack_chunk.
+  void add_types(const Chunk& voxels, const VoxelRegistry* types = nullptr) {
     const ChunkStorage* mixed = ChunkStorage::of(voxels);
+    if (types != nullptr) add_turned(voxels, *types);
     const std::size_t begin = record.words.size();
     for (const std::size_t header : headers_) {
       QUOIN_ASSERT(header + 3 < record.words.size(), "a header of the record");
       if (mixed == nullptr) {
         record.words[header + 3] = *voxels.uniform();
+        if (types != nullptr) put_address(header, begin);
         continue;
       }
       put_address(header, begin);
@@ -267,6 +282,48 @@ class RecordWriter {
       }
     }
   }
+  void add_turned(const Chunk& voxels, const VoxelRegistry& types) {
+    const std::size_t begin = record.words.size();
+    voxels.for_each_data([&](IVec3 local, const VoxelData& data) {
+      const VoxelType type = voxels.get(local);
+      if (!types.is_turned_by_state(type)) return;
+      const StateOrientations& orientations = types[type].orientations;
+      const std::uint32_t turn = state_turn(orientations, data.state);
+      if (turn == state_turn(orientations, 0)) return;
+      const auto number = static_cast<std::uint32_t>(local.x + kChunkEdge * (local.y + kChunkEdge * local.z));
+      record.words.push_back(number | turn << 18);
+    });
+    const auto first = record.words.begin() + static_cast<std::ptrdiff_t>(begin);
+    std::sort(first, record.words.end(), [](std::uint32_t a, std::uint32_t b) { return a << 14 < b << 14; });
+    record.words.push_back(static_cast<std::uint32_t>(record.words.size() - begin));
+  }
+  // Adds the lists of a word of 4^3 voxels. Returns where they lie.
+  std::uint32_t add_lists(ShapeIndex::Reader& reader, IVec3 first, FunctionRef<bool(const PlacedShape&)> with,
+                          FunctionRef<ShaderShape(const PlacedShape&)> shape_of) {
+    const std::size_t begin = record.words.size();
+    std::vector<std::uint32_t> starts;
+    std::vector<std::uint32_t> lists;
+    for (int i = 0; i < 64; ++i) {
+      const IVec3 cell = first + IVec3{i & 3, i >> 2 & 3, i >> 4};
+      const std::size_t start = lists.size();
+      for (const PlacedShape& shape : reader.at(cell)) {
+        if (!with(shape)) continue;
+        const IVec3 place = shape.voxel - cell + 1;
+        QUOIN_ASSERT((IBox{IVec3(0), IVec3(3)}.contains(place)), "a shape within a voxel");
+        const ShaderShape made = shape_of(shape);
+        lists.push_back(made.what | static_cast<std::uint32_t>(place.x + 3 * place.y + 9 * place.z) << kShapePlace);
+        lists.push_back(made.model);
+      }
+      if (lists.size() == start) continue;
+      lists[lists.size() - 2] |= kShapeIsLast;
+      starts.push_back(static_cast<std::uint32_t>(start));
+    }
+    for (const std::uint32_t start : starts) {
+      record.words.push_back(static_cast<std::uint32_t>(starts.size()) + start);
+    }
+    record.words.insert(record.words.end(), lists.begin(), lists.end());
+    return static_cast<std::uint32_t>(begin);
+  }
   void add_words(const trace::BrickWords& brick) {
     for (std::size_t i = 0; i < 64; ++i) {
       if (brick[i] != 0) add(brick[i]);
@@ -284,17 +341,31 @@ void ChunkRecord::move_to(std::uint64_t address) {
     words[at] = static_cast<std::uint32_t>(moved);
     words[at + 1] = static_cast<std::uint32_t>(moved >> 32);
   }
-  for (Node* node : {&opaque, &transparent, &field, &glass}) {
+  for (Node* node : {&opaque, &transparent, &field, &glass, &shapes}) {
     if (node->mask != 0) node->children += address;
   }
 }
 
-ChunkRecord pack_chunk(const OccupancyTree& opaque, const OccupancyTree* transparent, const Chunk& voxels,
-                       IVec3 chunk) {
+std::uint32_t state_turn(const StateOrientations& orientations, std::uint32_t state) {
+  const AxisOrientation back = orientations.of(state).inverse();
+  std::uint32_t turn = 0;
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    IVec3 along(0);
+    along[static_cast<int>(axis)] = 1;
+    const IVec3 turned = back.apply(along);
+    for (int i = 0; i < 3; ++i) {
+      if (turned[i] != 0) turn |= (axis | (turned[i] < 0 ? 4U : 0U)) << (3 * i);
+    }
+  }
+  return turn;
+}
+
+ChunkRecord pack_chunk(const OccupancyTree& opaque, const OccupancyTree* transparent, const Chunk& voxels, IVec3 chunk,
+                       const VoxelRegistry* types) {
   RecordWriter writer;
   writer.record.opaque = writer.add_tree(opaque, chunk);
   if (transparent != nullptr) writer.record.transparent = writer.add_tree(*transparent, chunk);
-  writer.add_types(voxels);
+  writer.add_types(voxels, types);
   return std::move(writer.record);
 }
 
@@ -311,6 +382,16 @@ ChunkRecord pack_glass_chunk(const DensityGlass& glass, IVec3 chunk) {
   static const Chunk none;
   RecordWriter writer;
   writer.record.glass = writer.add_glass(glass, chunk);
+  writer.add_types(none);
+  return std::move(writer.record);
+}
+
+ChunkRecord pack_shapes_chunk(const OccupancyTree& cells, const ShapeIndex& index, IVec3 chunk,
+                              FunctionRef<bool(const PlacedShape&)> with,
+                              FunctionRef<ShaderShape(const PlacedShape&)> shape_of) {
+  static const Chunk none;
+  RecordWriter writer;
+  writer.record.shapes = writer.add_shapes(cells, index, chunk, with, shape_of);
   writer.add_types(none);
   return std::move(writer.record);
 }

@@ -4,10 +4,13 @@
 #include <cstdint>
 #include <vector>
 
+#include <quoin/core/function_ref.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/density_grid.h>
+#include <quoin/grid/voxel_registry.h>
 #include <quoin/trace/occupancy_tree.h>
 
+#include "grid/shapes/shape_index.h"
 #include "render/vulkan/trees/shader_data.h"
 #include "trace/density/density_glass.h"
 
@@ -24,6 +27,7 @@ struct ChunkRecord {
   Node transparent;
   Node field;
   Node glass;
+  Node shapes;
 
   /// Makes the addresses, which count from the record's beginning, absolute. Called once.
   void move_to(std::uint64_t address);
@@ -33,9 +37,15 @@ struct ChunkRecord {
   std::vector<std::size_t> addresses_;  // their indices in `words`
 };
 
-/// Packs a chunk of voxels. `transparent` may be null.
+/// Packs a chunk of voxels. `transparent` may be null. With `types`, the voxels' types are preceded by the voxels that
+/// their state turns otherwise than `state_turn(orientations of their type, 0)`: the voxel's number x + 64 y + 4096 z,
+/// plus its turn from bit 18 on; ascending, then their count.
 [[nodiscard]] ChunkRecord pack_chunk(const OccupancyTree& opaque, const OccupancyTree* transparent, const Chunk& voxels,
-                                     IVec3 chunk);
+                                     IVec3 chunk, const VoxelRegistry* types = nullptr);
+
+/// Returns the turn from a cube in the grid to the unturned cube, for a state: three bits per axis of the unturned
+/// cube, the number of the grid's axis there, plus 4 if it points against it.
+[[nodiscard]] std::uint32_t state_turn(const StateOrientations& orientations, std::uint32_t state);
 
 /// Packs a field chunk: like a chunk of voxels, a tree of the cells that touch its solid, with the materials of its
 /// samples. The words of a brick's cells are followed by one number per word: the offset of its samples in words from
@@ -47,6 +57,13 @@ struct ChunkRecord {
 [[nodiscard]] ChunkRecord pack_glass_chunk(const DensityGlass& glass, IVec3 chunk);
 /// The number of samples that such a record reads beyond the chunk.
 constexpr int kFieldRecordReach = 2;
+
+/// Packs the shapes that touch voxels of a chunk: a tree of the voxels in `cells`, and their lists (shapes.glsl).
+/// `with`: returns true for shapes that belong to the lists; every voxel in `cells` has one of them in `index`. No
+/// brick or chunk counts as full.
+[[nodiscard]] ChunkRecord pack_shapes_chunk(const OccupancyTree& cells, const ShapeIndex& index, IVec3 chunk,
+                                            FunctionRef<bool(const PlacedShape&)> with,
+                                            FunctionRef<ShaderShape(const PlacedShape&)> shape_of);
 
 /// The nodes above chunks.
 struct TopTree {

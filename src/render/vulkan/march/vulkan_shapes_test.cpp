@@ -1,0 +1,173 @@
+// Marched images show the shapes of voxel types as the CPU renderer does.
+
+#include <string>
+#include <utility>
+
+#include <glm/gtc/quaternion.hpp>
+
+#include <quoin/render/propagated_light.h>
+
+#include "grid/shapes/shape_types_for_tests.h"
+#include "render/vulkan/device/vulkan_for_tests.h"
+
+namespace quoin {
+namespace {
+
+using render_test::random_faces;
+using render_test::sized;
+using render_test::towards;
+using vulkan_test::expect_equal;
+
+// Noise whose texels are visible or not, or hide half of the background.
+Texture noise_with_alpha(unsigned seed, std::uint8_t least_alpha) {
+  std::mt19937 random(seed);
+  AlphaImage image{16, 16, {}};
+  for (int i = 0; i < 256; ++i) {
+    for (int channel = 0; channel < 3; ++channel) image.rgba.push_back(static_cast<std::uint8_t>(random()));
+    image.rgba.push_back(random() % 3 == 0 ? least_alpha : std::uint8_t{200});
+  }
+  return Texture::from_image("noise", image).value();
+}
+
+// A garden with a street of shapes; the types with glass are optional.
+struct Garden {
+  Scene scene;
+  ShapeTypes types{scene.types};
+  VoxelType textured = kAir;  // stairs, turned by their state
+  VoxelType leaf = kAir;      // crossed plates with cutout texels
+  VoxelType stained = kAir;   // translucent texels
+  GridHandle grid;
+
+  explicit Garden(bool has_glass, DVec3 position = DVec3(0.0)) {
+    VoxelProperties stairs{.name = "textured", .state_bits = 3};
+    stairs.faces = random_faces(5);
+    stairs.orientations = StateOrientations::about_y_and_upside_down();
+    stairs.shapes = scene.types[types.stairs].shapes;
+    textured = *scene.types.add(stairs);
+    VoxelProperties crossed{.name = "leaf", .visibility = Visibility::Transparent};
+    crossed.faces = VoxelFaces(VoxelFace{.texture = noise_with_alpha(3, 0), .alpha = FaceAlpha::Cutout});
+    crossed.shapes = VoxelShape::crossed_plates();
+    leaf = *scene.types.add(crossed);
+    VoxelProperties pane{.name = "stained", .visibility = Visibility::Transparent};
+    pane.faces = VoxelFaces(VoxelFace{.texture = noise_with_alpha(4, 90), .alpha = FaceAlpha::Translucent});
+    pane.shapes = VoxelShape::box({0, 0, 7}, {16, 16, 9});
+    stained = *scene.types.add(pane);
+    SceneGrid garden;
+    garden.grid = voxels(has_glass);
+    garden.pivot = {0.5, 0.25, -0.5};
+    grid = scene.add_grid(std::move(garden));
+    scene.add_instance({"", grid, position});
+  }
+
+  [[nodiscard]] Grid voxels(bool has_glass) const {
+    Grid g;
+    g.fill_box({{-8, -1, -8}, {9, 0, 9}}, types.stone);
+    for (int i = -5; i < 6; ++i) g.set({i, 0, -5}, types.fence);
+    for (int i = -4; i < 3; ++i) g.set({-5, 0, i}, types.fence);
+    for (std::uint32_t i = 0; i < 8; ++i) {
+      g.set({static_cast<int>(i) - 4, 0, -3}, i % 2 == 0 ? types.stairs : textured, {.state = i});
+    }
+    g.fill_box({{-4, 0, -1}, {-1, 1, 1}}, types.slab);
+    g.fill_box({{0, 0, -1}, {1, 2, 0}}, types.stone);
+    for (std::uint32_t i = 0; i < 6; ++i) g.set({static_cast<int>(i) - 3, 1, -6}, types.torch, {.state = i});
+    g.set({1, 1, -1}, types.torch, {.state = 0});
+    g.set({-3, 0, 2}, types.flower);
+    g.fill_box({{2, 0, 0}, {5, 1, 2}}, leaf);
+    for (int y = 0; y < 2; ++y) g.set({2, y, -2}, types.door, {.state = 1});
+    g.set({3, 3, 3}, types.beam);
+    g.set({-6, 0, 5}, types.beam);
+    if (!has_glass) return g;
+    for (std::uint32_t i = 0; i < 5; ++i) g.set({static_cast<int>(i) - 3, 0, 4}, types.water, {.state = i});
+    g.fill_box({{-4, -2, 5}, {0, 0, 7}}, types.water);
+    g.fill_box({{3, 0, 5}, {6, 3, 6}}, types.pane);
+    g.fill_box({{0, 0, 6}, {3, 2, 7}}, stained);
+    return g;
+  }
+  // Adds a turned, mirrored instance of another voxel size.
+  void add_turned(DVec3 position) {
+    Instance instance;
+    instance.grid = grid;
+    instance.position = position;
+    instance.rotation = glm::angleAxis(2.3, glm::normalize(DVec3(3, 1, 2)));
+    instance.voxel_size = 0.6;
+    instance.mirrored = true;
+    scene.add_instance(instance);
+  }
+};
+
+class VulkanShapes : public vulkan_test::VulkanTest {
+ protected:
+  void compare(const Scene& scene, const Camera& camera, const RenderOptions& whole, const std::string& name) {
+    const RenderOptions options = vulkan_test::of_day(whole);
+    expect_equal(taken(scene, camera, options), render_test::taken(scene, camera, options), "shapes_" + name);
+  }
+};
+
+TEST_F(VulkanShapes, NearAndDistantShapesMatchCpu) {
+  Garden garden(false);
+  garden.add_turned({-3.0, 7.5, 2.0});
+  const RenderOptions options = sized(240, 180);
+  compare(garden.scene, towards({6, 5, 9}, {0, 0, 0}), options, "near");
+  compare(garden.scene, towards({-2.5, 0.8, 3.2}, {-1, 0.3, -3}), options, "eye");
+  compare(garden.scene, towards({60, 40, 90}, {0, 1, 0}, 0.3), options, "distant");
+  compare(garden.scene, render_test::from_above(0.31, 30, -0.43, 15.7), options, "flat");
+}
+
+// Drivers for processors compile the light behind glass for half a minute.
+TEST_F(VulkanShapes, GlassOfShapesMatchesCpu) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
+  Garden garden(true);
+  garden.add_turned({-3.0, 7.5, 2.0});
+  const RenderOptions options = sized(240, 180);
+  compare(garden.scene, towards({6, 5, 12}, {0, 0, 2}), options, "glass");
+  compare(garden.scene, towards({-1.2, 0.7, 4.4}, {3, 0.4, 5}), options, "in_water");
+}
+
+// Edits of voxels, of states and next to shapes that follow their neighbours.
+TEST_F(VulkanShapes, EditedShapesMatchCpu) {
+  Garden garden(is_nightly());
+  const Camera camera = towards({6, 5, 9}, {0, 0, 0});
+  const RenderOptions options = sized(160, 120);
+  compare(garden.scene, camera, options, "before_edits");
+  const auto all = renderer_->uploaded_bytes();
+  Grid& grid = garden.scene.edit(garden.grid).grid;
+  grid.set({0, 0, -4}, garden.types.stone);  // next to the fence
+  compare(garden.scene, camera, options, "next_to_fence");
+  EXPECT_GT(renderer_->uploaded_bytes(), 0U);
+  EXPECT_LT(renderer_->uploaded_bytes(), all);
+  garden.scene.edit(garden.grid).grid.set_data({-2, 0, -3}, {.state = 1});
+  garden.scene.edit(garden.grid).grid.set_data({2, 0, -2}, {.state = 2});
+  compare(garden.scene, camera, options, "states");
+  garden.scene.edit(garden.grid).grid.set({3, 3, 3}, kAir);
+  garden.scene.edit(garden.grid).grid.set({20, 2, 3}, garden.types.beam);
+  compare(garden.scene, camera, options, "moved_beam");
+  VoxelProperties changed = garden.scene.types[garden.types.slab];
+  changed.shapes = VoxelShape::box({2, 0, 2}, {14, 12, 14});
+  garden.scene.types.replace(garden.types.slab, changed);
+  compare(garden.scene, camera, options, "other_shape");
+  garden.scene.edit(garden.grid).grid.fill_box({{-40, 0, -40}, {40, 40, 40}}, kAir);
+  garden.scene.edit(garden.grid).grid.fill_box({{-40, -2, 5}, {40, 0, 7}}, kAir);
+  compare(garden.scene, camera, options, "no_shapes");
+}
+
+TEST_F(VulkanShapes, LightOfShapesMatchesCpu) {
+  Garden garden(false);
+  garden.scene.lamps.push_back({.position = {2.2, 3.1, 1.3}, .intensity = 60.0});
+  const Camera camera = towards({5, 4, 7}, {0, 0, -1});
+  RenderOptions options = sized(160, 120);
+  options.light = natural_light();
+  compare(garden.scene, camera, options, "natural");
+  options = sized(160, 120);
+  options.light.occlusion_mode = OcclusionMode::Vertex;
+  compare(garden.scene, camera, options, "vertex");
+  options.light.model = LightModel::Propagated;
+  compare(garden.scene, camera, options, "propagated");
+  for (const Shading shading : {Shading::Unlit, Shading::Normals, Shading::Occlusion}) {
+    options = sized(96, 72);
+    options.light.shading = shading;
+    compare(garden.scene, camera, options, "shading_" + std::to_string(static_cast<int>(shading)));
+  }
+}
+
+}  // namespace
+}  // namespace quoin
