@@ -86,11 +86,11 @@ class [[gnu::visibility("hidden")]] BulkMemory {
 /// Base of objects that can be created in a BulkMemory, or alone. Requires: `delete` names their own type.
 class BulkAllocated {
  public:
-  // Not inlined: GCC would warn that `operator delete` does not match `::operator new`.
+  // Not inlined: GCC would warn that `operator delete` does not match them.
   [[gnu::noinline]] static void* operator new(std::size_t bytes) {
     return new (::operator new(sizeof(BulkMemory::Head) + bytes)) BulkMemory::Head{} + 1;
   }
-  static void* operator new(std::size_t bytes, BulkMemory& memory) { return memory.allocate(bytes); }
+  [[gnu::noinline]] static void* operator new(std::size_t bytes, BulkMemory& memory) { return memory.allocate(bytes); }
   static void operator delete(void* object) {
     if (object == nullptr) return;
     auto* const head = static_cast<BulkMemory::Head*>(object) - 1;
