@@ -10,6 +10,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/mesh/blocky.h>
 
+#include "core/coordinates/chunk_order.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin::path {
@@ -129,6 +130,7 @@ Vec3 radiance_at(const PathLamp& lamp, Vec3 from_corner) {
   DVec3 inside(0.0);
   inside[frame.u] = in_voxel(lamp.u, lamp.size_u);
   inside[frame.v] = in_voxel(lamp.v, lamp.size_v);
+  if (lamp.unturned != AxisOrientation()) inside = lamp.unturned.apply(inside - 0.5) + 0.5;
   return lamp.texels->colour(lamp.texels->texel(inside, IVec3(0), 0)) * lamp.light_of_texel;
 }
 
@@ -274,6 +276,17 @@ PathLamp lamp_of_quad(const Quad& quad, IVec3 chunk, const PlacedGrid& placed, V
   return lamp;
 }
 
+// Appends the chunks whose quads may have other orientations after changes of the voxels' data.
+void add_turned(const Grid& grid, const VoxelRegistry& types, const DataChanges& data, std::vector<IVec3>& chunks) {
+  if (!types.has_turned_by_state()) return;
+  if (data.all) {
+    chunks = grid.chunks();
+    return;
+  }
+  for (const DataChange& change : data.items_unless_all()) chunks.push_back(change.chunk);
+  sort_and_unite(chunks);
+}
+
 PathLamp lamp_without_body(const PlacedLamp& from) {
   PathLamp lamp;
   lamp.is_point = true;
@@ -307,18 +320,26 @@ std::shared_ptr<const PathLamps> PathLampCache::lamps(const Scene& scene, std::s
   std::map<GridHandle, bool> is_known;
   for (std::size_t i = 0; i < placed.size(); ++i) {
     const GridHandle handle = scene.instances()[placed[i].instance].grid;
-    EmissiveChunks<Quad>& quads = quads_[handle];
+    OfGrid& of = quads_[handle];
     if (is_known.try_emplace(handle, true).second) {
       const Grid& grid = scene.grids().find(handle)->grid;
-      quads.follow(
-          grid, scene.types, [&](const GridChanges& changes) { return chunks_to_mesh(grid, changes); },
-          [&](IVec3 chunk) { return emissive_quads(grid, scene.types, chunk, mesher); });
+      ChangeCursor followed_data = of.followed_data;
+      const DataChanges data = grid.data_changes_since(followed_data);
+      const auto chunks_of = [&](const GridChanges& changes) {
+        std::vector<IVec3> chunks = chunks_to_mesh(grid, changes);
+        if (!changes.all) add_turned(grid, scene.types, data, chunks);
+        return chunks;
+      };
+      of.quads.follow(grid, scene.types, chunks_of,
+                      [&](IVec3 chunk) { return emissive_quads(grid, scene.types, chunk, mesher); });
+      of.followed_data = followed_data;
     }
-    quads.for_each([&](IVec3 chunk, const Quad& quad) {
+    of.quads.for_each([&](IVec3 chunk, const Quad& quad) {
       const auto factor = static_cast<float>(std::min(brightness, 1e9));
       const TypeFaces* const textured = surfaces.faces(quad.type());
+      const AxisOrientation unturned = quad.orientation().inverse();
       const FaceTexels* const side =
-          textured == nullptr ? nullptr : &textured->sides[static_cast<std::size_t>(quad.direction())];
+          textured == nullptr ? nullptr : &textured->sides[static_cast<std::size_t>(unturned.apply(quad.direction()))];
       const Vec3 radiance = (side == nullptr ? surfaces[quad.type()].emitted : side->mean() * side->emission) * factor;
       if (is_black(radiance)) return;
       faces.push_back(
@@ -326,6 +347,7 @@ std::shared_ptr<const PathLamps> PathLampCache::lamps(const Scene& scene, std::s
       PathLamp& lamp = lamps.emplace_back(lamp_of_quad(quad, chunk, placed[i], radiance));
       if (side == nullptr) return;
       lamp.texels = side;
+      lamp.unturned = unturned;
       lamp.light_of_texel = side->emission * factor;
     });
   }

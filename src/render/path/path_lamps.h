@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/axis_orientation.h>
+#include <quoin/core/changes.h>
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
 #include <quoin/mesh/quad.h>
@@ -36,6 +38,7 @@ struct PathLamp {
   /// The texture of the face, whose mean is `radiance`; null without one. The Surfaces of PathLampCache::lamps own it.
   const FaceTexels* texels = nullptr;
   Direction face = Direction::PosX;  ///< in the grid
+  AxisOrientation unturned{};        ///< turns the voxels' faces back (VoxelProperties::orientations)
   float voxel_size = 1.0F;           ///< world units
   float light_of_texel = 0.0F;       ///< radiance as a multiple of the texel's colour
 };
@@ -103,7 +106,11 @@ class PathLampCache {
                                                        const Surfaces& surfaces, double brightness);
 
  private:
-  std::map<GridHandle, EmissiveChunks<Quad>> quads_;
+  struct OfGrid {
+    EmissiveChunks<Quad> quads;
+    ChangeCursor followed_data;  // the state turns faces
+  };
+  std::map<GridHandle, OfGrid> quads_;
 };
 
 }  // namespace quoin::path

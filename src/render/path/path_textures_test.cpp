@@ -257,50 +257,65 @@ TEST(PathTextures, ShowsTexelsWithinGlassOfAnotherGrid) {
   EXPECT_GT(difference(opaque, image_of(FaceAlpha::Cutout, 0)), 0.01);
 }
 
-// A dark ceiling with one lamp, whose texture lights one half, and a lamp of half the size.
+// A dark ceiling with one lamp, whose texture lights one half, and a lamp of half the size. The lamp's state may turn it
+// by a half turn about y, after the first image.
 TEST(PathTextures, SamplesLightOfTexels) {
-  const auto image_of = [](bool has_texture) {
-    Scene scene;
-    const VoxelType ground = add_type(scene, {200, 200, 200, 255});
-    const VoxelType bright = add_type(scene, {255, 255, 255, 255}, Visibility::Opaque, 4.0F);
-    const VoxelType dark = add_type(scene, {0, 0, 0, 255});
-    VoxelProperties half = textured({.texture = drawn([](int x, int) {
-                                       const auto c = static_cast<std::uint8_t>(x < 8 ? 255 : 0);
-                                       return Rgba8{c, c, c, 255};
-                                     })});
-    half.emission = 4.0F;
-    const VoxelType lamp = scene.types.add(half).value();
-    Grid floor;
-    floor.fill_box({{-8, -2, -8}, {8, -1, 8}}, ground);
-    place(scene, std::move(floor));
-    Grid ceiling;
-    if (has_texture) {
-      ceiling.fill_box({{-4, 4, -4}, {5, 5, 5}}, dark);
-      ceiling.set({0, 4, 0}, lamp);
-      place(scene, std::move(ceiling));
-    } else {
-      // On the bottom, the texture's right is at +X.
-      ceiling.fill_box({{-8, 8, -8}, {10, 10, 10}}, dark);
-      ceiling.fill_box({{0, 8, 0}, {1, 9, 2}}, bright);
-      scene.edit(place(scene, std::move(ceiling))).voxel_size = 0.5;
-    }
-    PathOptions options = under_even_sky(24, 24, 64);
-    physical_in(options).sky.brightness = 0.0;
-    options.max_bounces = 2;
-    // Below the lamp.
-    return path_image(scene, from_above(0.5, 3.5, 0.5, 5.0), options);
-  };
-  const PathImage a = image_of(true);
-  const PathImage b = image_of(false);
-  const auto part = [](const PathImage& image, int from, int to) {
-    double sum = 0.0;
-    for (int y = 0; y < 24; ++y) {
-      for (int x = from; x < to; ++x)
-        sum += static_cast<double>(image.radiance[static_cast<std::size_t>(24 * y + x)].x);
-    }
-    return sum;
-  };
-  for (int x = 0; x < 24; x += 6) EXPECT_NEAR(part(a, x, x + 6) / part(b, x, x + 6), 1.0, 0.05) << x;
+  for (const bool is_turned : {false, true}) {
+    const auto image_of = [is_turned](bool has_texture) {
+      Scene scene;
+      const VoxelType ground = add_type(scene, {200, 200, 200, 255});
+      const VoxelType bright = add_type(scene, {255, 255, 255, 255}, Visibility::Opaque, 4.0F);
+      const VoxelType dark = add_type(scene, {0, 0, 0, 255});
+      VoxelProperties half = textured({.texture = drawn([](int x, int) {
+                                         const auto c = static_cast<std::uint8_t>(x < 8 ? 255 : 0);
+                                         return Rgba8{c, c, c, 255};
+                                       })});
+      half.emission = 4.0F;
+      half.state_bits = 2;
+      half.orientations = StateOrientations::about_y();
+      const VoxelType lamp = scene.types.add(half).value();
+      Grid floor;
+      floor.fill_box({{-8, -2, -8}, {8, -1, 8}}, ground);
+      place(scene, std::move(floor));
+      Grid ceiling;
+      InstanceHandle handle;
+      if (has_texture) {
+        ceiling.fill_box({{-4, 4, -4}, {5, 5, 5}}, dark);
+        ceiling.set({0, 4, 0}, lamp);
+        handle = place(scene, std::move(ceiling));
+      } else {
+        // On the bottom, the texture's right is at +X.
+        ceiling.fill_box({{-8, 8, -8}, {10, 10, 10}}, dark);
+        const int x = is_turned ? 1 : 0;
+        ceiling.fill_box({{x, 8, 0}, {x + 1, 9, 2}}, bright);
+        scene.edit(place(scene, std::move(ceiling))).voxel_size = 0.5;
+      }
+      PathOptions options = under_even_sky(24, 24, 64);
+      physical_in(options).sky.brightness = 0.0;
+      options.max_bounces = 2;
+      const Camera below = from_above(0.5, 3.5, 0.5, 5.0);
+      PathTracer tracer(scene);
+      if (is_turned && has_texture) {
+        PathOptions few = options;
+        few.samples = 1;
+        EXPECT_TRUE(tracer.render(below, few));
+        scene.edit(scene.instances()[handle].grid).grid.set_data({0, 4, 0}, {2, {}});
+        tracer.update();
+      }
+      return tracer.render(below, options).value();
+    };
+    const PathImage a = image_of(true);
+    const PathImage b = image_of(false);
+    const auto part = [](const PathImage& image, int from, int to) {
+      double sum = 0.0;
+      for (int y = 0; y < 24; ++y) {
+        for (int x = from; x < to; ++x)
+          sum += static_cast<double>(image.radiance[static_cast<std::size_t>(24 * y + x)].x);
+      }
+      return sum;
+    };
+    for (int x = 0; x < 24; x += 6) EXPECT_NEAR(part(a, x, x + 6) / part(b, x, x + 6), 1.0, 0.05) << x << is_turned;
+  }
 }
 
 // Shapes: paths meet their sides, with their textures.
