@@ -53,6 +53,10 @@ struct MeshImageOptions {
 ///           and shadow edges; also glass with `glass_by_rays`. Walls of smooth glass bodies are equal to 4, away from
 ///           their edges. Light brighter than white counts as white behind glass. There is no inside view: only faces
 ///           towards the camera are drawn. Textures are sampled once per pixel and face, at any number of samples.
+/// Shapes:   a visible face takes 8 bytes of device memory, and each different face of a chunk's models 112. Occlusion
+///           is that of the mesh, also inside of voxels, where CpuRenderer has none with `OcclusionMode::Vertex`.
+/// Cutouts:  texels that are not visible show the background. Both sides of cutout faces are drawn; the inner one has
+///           the occlusion of the outer one. For rays, cubes with such faces are glass of their mean colour.
 /// Light:    rays from each visible point through the VulkanRenderer's voxels, at the image's level of detail, find
 ///           shadows and lamp light. Everything that casts shadows in that renderer also casts them here, drawn or not.
 ///           Rays from smooth surfaces start one voxel in front of the surface. Glass tints sunlight separately per
@@ -65,7 +69,8 @@ struct MeshImageOptions {
 ///           renderer's voxels, so no sorting is needed. Surfaces behind the first surface of a smooth body have the
 ///           orientation of its voxels, blurred. Without rays, quads are sorted by the distance of their centres, so
 ///           large merged quads close to each other can be drawn in the wrong order; above 1,048,576 quads per image,
-///           only chunks are sorted. Fields are always opaque. Glass is opaque if Shading is Occlusion or Normals.
+///           only chunks are sorted. Translucent texels are shown without rays; with them, cubes have their mean
+///           colour. Fields are always opaque. Glass is opaque if Shading is Occlusion or Normals.
 /// Far:      geometry is made relative to the camera in double precision, as in CpuRenderer. The near plane is at
 ///           1/1024 of a voxel.
 /// Lifetime: the VulkanRenderer passed to `create` must outlive it.

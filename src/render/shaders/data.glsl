@@ -168,11 +168,13 @@ const uint kTurnBits = 0x1FF;
 const uint kIsTurnedByState = 0x80000000u;
 
 // A face of a type: the address of its texels, of all mipmap levels, level 0 first. Then in bits 0-3 log2 of the texels
-// per side; and for the texture's rows (bits 4-6) and columns (8-10) the axis of the grid, plus 4 if they run against
-// it; a word for fields: field_textures.glsl. `tint`: in linear light; w: the emission.
+// per side; for the texture's rows (bits 4-6) and columns (8-10) the axis of the grid, plus 4 if they run against it;
+// the use of alpha (12-13: opaque, cutout, translucent); and the face's turn (16-17) and mirror (18). Then the tint in
+// sRGB. `tint`: in linear light; w: the emission. `on_fields`: field_textures.glsl.
 struct TexturedFace {
   uvec4 what;
   vec4 tint;
+  uint on_fields;
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer TexturedFaces {
   TexturedFace at[];

@@ -1,6 +1,6 @@
-// The textures of materials on fields; matches TriplanarRule and triplanar_colour (scene/surfaces.h) on the CPU. The last
-// words of a type's six textured faces hold its rule: `steep_y`, `flat_y`, the textures per voxel, and the fraction of
-// this number in units of 2^-32 and 2^-64.
+// The textures of materials on fields; matches TriplanarRule and triplanar_colour (scene/surfaces.h) on the CPU. The
+// type's six textured faces hold its rule in `on_fields`: `steep_y`, `flat_y`, the textures per voxel, and the fraction
+// of this number in units of 2^-32 and 2^-64.
 
 // A point of a field's surface, in voxels of the full grid.
 struct FieldPoint {
@@ -37,10 +37,7 @@ void show_on_field(uint type, FieldPoint point, inout Surface surface) {
   TexturedFaces faces = TexturedFaces(frame().textured_faces);
   uint first = 6 * (number - 1);
   uint rule[5];
-  for (int i = 0; i < 5; ++i) {
-    uvec4 what = faces.at[first + i].what;
-    rule[i] = what.w;
-  }
+  for (int i = 0; i < 5; ++i) rule[i] = faces.at[first + i].on_fields;
   float scale = uintBitsToFloat(rule[2]);
   vec3 inside = point.inside * scale;
   for (int axis = 0; axis < 3; ++axis) inside[axis] += fraction_of(point.voxel[axis], uvec2(rule[3], rule[4]));

@@ -17,7 +17,7 @@ Surface surface_of(uint type) {
   return Surface(colour.xyz, colour.w, emitted.xyz, surfaces.at[i + 2].xyz, emitted.w);
 }
 
-// True if any opaque type has textures; otherwise shaders are compiled without them.
+// True if any type has textures; otherwise shaders are compiled without them.
 layout(constant_id = 7) const bool kHasTextures = false;
 
 const float kMeanOfFace = 1e30;

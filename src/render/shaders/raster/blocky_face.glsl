@@ -48,3 +48,43 @@ vec3 light_of(uint face) {
   LevelPlace at = LevelPlace(voxel.xyz, before_face(face, 0.0) - floor(behind), face_normal(face), int(face));
   return traced_light(voxel, base.xyz & ~63, vec3(base.xyz & 63) + from, normal.xyz, diffuse, at);
 }
+
+#ifndef IS_IMPOSTOR
+// Returns the square of the distance of samples at a point, in voxels from `base`.
+float square_spacing_at(vec3 at) {
+  vec3 away = at - viewer.xyz;
+  return viewer.w * viewer.w * (viewer.w > 0.0 ? dot(away, away) : 1.0);
+}
+
+// Shapes. The vertex shader's outputs (shape.glsl) are the normal of the side that is seen in `edges`, the direction
+// nearest to it and the voxel in `what.x`, the texture's coordinates and the emission in `colour`, and the texture in
+// `texels`: z is 0 if the face has the colour of its type, w the tint in sRGB.
+
+vec3 shape_tint() {
+  return linear_from_srgb(unpackUnorm4x8(texels.w).xyz);
+}
+void show_texture_of_shape(inout Surface surface) {
+  vec3 texel = texel_of(texels, vec3(colour.xy, 0.0), square_spacing_at(place.xyz) * edges.w);
+  set_texel(texel, vec4(shape_tint(), colour.z), surface);
+}
+
+// Returns the normal of the fragment's shape, in the world.
+vec3 shape_normal() {
+  vec4 axes[3] = mesh_frame().instances[what.y].axes;
+  return axes[0].xyz * edges.x + axes[1].xyz * edges.y + axes[2].xyz * edges.z;
+}
+
+LitPoint point_of_shape(Surface surface) {
+  MeshFrame f = mesh_frame();
+  vec3 normal = shape_normal();
+  vec4 sun = f.sun;
+  ivec4 home = f.instances[what.y].home;
+  uint bits = what.x >> kShapeVoxelShift;
+  ivec4 voxel = ivec4(base.xyz + ivec3(bits & 63, bits >> 6 & 63, bits >> 12 & 63), home.w);
+  vec3 from = place.xyz;
+  if (home.w >= 0) from += frame().lift / placed_at(home.w).ref_view.w * edges.xyz;
+  LevelPlace at = LevelPlace(base.xyz + ivec3(floor(place.xyz)), fract(place.xyz), edges.xyz, -1);
+  return LitPoint(voxel, base.xyz & ~63, vec3(base.xyz & 63) + from, normal, max(dot(normal, sun.xyz), 0.0),
+                  surface.colour, surface.emitted, place.w, at);
+}
+#endif

@@ -15,6 +15,10 @@ const bool kHasGlass = true;
 
 layout(location = 0) out vec4 pixel;
 
+// Lengths of the ray, in voxels, between its start and the fragment: behind the face of a cube; before that of a shape,
+// whose box the ray then enters.
+const float kWithin = 1e-4;
+
 vec3 normal_met(int instance, uint face, float t) {
   return face_normal(placed_at(instance), face);
 }
@@ -31,6 +35,7 @@ LitPoint point_of_body(Body body) {
 
 // Adds the fragment's body, which begins in its face; bodies of other instances around the ray's start began earlier.
 void enter_first(inout BodyList list) {
+  if (kPart == kShapes) return;
   for (uint i = 0; i < list.count; ++i) {
     Body body = listed_body(list, i);
     if ((body.what.z & kHowItBegins) != kStartsInside || body.voxel.w != seen_home) continue;
@@ -41,10 +46,10 @@ void enter_first(inout BodyList list) {
 }
 
 void main() {
-  const float kWithin = 1e-4;
-  if (is_beyond(what.x)) discard;
-  // With traced light and without textures vertices output the colour 0 and no texels; these are read so that no output
-  // is unused.
-  vec4 nothing = colour + viewer + vec4(texels);
-  pixel = nothing + seen_from(mesh_frame().instances[what.y].home.w, base.xyz, before_face(what.x, -kWithin));
+  if (kPart != kShapes && is_beyond(what.x)) discard;
+  // Read so that no output of the vertex shader is unused.
+  vec4 nothing = min(abs(colour + viewer + vec4(texels)), vec4(0.0));
+  vec3 from = place.xyz + kWithin * edges.xyz;
+  if (kPart != kShapes) from = before_face(what.x, -kWithin);
+  pixel = nothing + seen_from(mesh_frame().instances[what.y].home.w, base.xyz, from);
 }

@@ -53,6 +53,6 @@ void main() {
   if (is_east) local[u] = 1.0;
   if (is_north) local[v] = 1.0;
   ivec4 home = mesh_frame().instances[push.instance].home;
-  put_face(face, uint(voxel.w) & 0xFFFF, push.instance, local, low, high, voxel.xyz + home.xyz,
-           openness_of(corners, corner));
+  put_face(face, face, uint(voxel.w) & 0xFFFF, push.instance, local, low, high,
+           voxel.xyz + home.xyz, openness_of(corners, corner));
 }

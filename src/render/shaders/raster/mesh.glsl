@@ -8,6 +8,7 @@ const uint kSurfaces = 0;
 const uint kEdgesOver = 1;
 const uint kEdgesOnly = 2;
 const uint kGlass = 3;  // and the channel
+const uint kDepth = 6;  // where surfaces are, before they are lit
 const uint kGlassDepth = 7;
 const uint kGlassPassed = 8;
 const uint kGlassAdded = 9;
@@ -34,6 +35,8 @@ struct MeshDraw {
   uint instance;
   uint pad;
   vec4 offset;
+  uvec2 records;  // of the chunk's shapes, as in ShapeRecord
+  uvec2 shapes;   // their faces
 };
 
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer MeshDraws {
@@ -43,7 +46,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Me
   uvec2 frame;  // of the image, shared with marched images
   uvec2 draws;
   uvec2 order;  // draw and quad indices of the transparent quads, in drawing order
-  uvec2 pad;
+  uvec2 emissions;  // of types that have shapes, as multiples of their colours: a number per type, as in `surfaces`
   vec4 sun;  // direction to it in the world; its length is the brightness
   MeshInstance instances[];
 };
@@ -55,13 +58,14 @@ layout(push_constant) uniform Push {
   vec3 offset;   // of the chunk, from its instance's reference point, in voxels; an impostor's centre
   uint instance;
   uvec2 frame;
-  uvec2 data;       // of the chunk, or of the impostor's level
-  uvec2 far_faces;  // of an impostor
+  uvec2 data;       // of the chunk: its quads, or the records of its shapes; or of the impostor's level
+  uvec2 far_faces;  // of an impostor; or the faces of the chunk's shapes
   float room;       // of the instance; the sky's: converts the distance from the image's centre to the tangent of an
                     // angle
   uint numbers;     // bits 0-3: draw mode; from 4 on for a smooth mesh: its vertices if it has materials, else 0; for an
-                    // impostor 4-27: share of pixels that use the coarser level, 28: 1 if
-                    // this is that level, 29: 1 if it has cells
+                    // impostor 4-27: share of pixels that use the coarser level, 28: 1 if this is that level, 29: 1 if
+                    // it has cells; for shapes and cutouts 30: 1 if their types are transparent, 31: 1 if only their
+                    // faces that hide the background are drawn
 } push;
 
 MeshFrame mesh_frame() {
@@ -75,6 +79,29 @@ bool has(uint flag) {
 }
 uint drawn() {
   return push.numbers & 15;
+}
+
+// The faces of a blocky mesh that a pipeline draws.
+layout(constant_id = 20) const uint kPart = 0;
+const uint kQuads = 0;
+const uint kCutouts = 1;  // quads of transparent types with visible and invisible texels, from both sides
+const uint kShapes = 2;
+const uint kMixed = 3;  // quads and shapes in the order stored in memory
+
+// Bits of the vertex output `what.x` above the direction.
+const uint kIsShapeFace = 8;
+const uint kShapeVoxelShift = 8;
+
+// Bits 12-13 of a textured face's third number.
+const uint kAlphaShift = 12;
+const uint kCutout = 1;
+const uint kTranslucent = 2;
+uint alpha_of(uint bits) {
+  return bits >> kAlphaShift & 3;
+}
+// Returns true if edges of triangles are drawn.
+bool draws_edges() {
+  return drawn() == kEdgesOver || drawn() == kEdgesOnly;
 }
 
 // Returns the unblocked sunlight on a face of an instance.

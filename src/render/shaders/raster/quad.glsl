@@ -58,7 +58,7 @@ float openness_of(uint corners, uint corner) {
   return 1.0 - float(corners >> 2 * corner & 3) / 3.0;
 }
 
-// Returns the surface of a face, in the colour that its fragments do not change.
+// Returns the surface of a face, in the colour that its fragments do not change. `face`: of the type.
 Surface surface_at_corner(uint face, uint type) {
   Surface surface = surface_of(type);
   if (!kHasTextures) return surface;
@@ -74,7 +74,9 @@ Surface surface_at_corner(uint face, uint type) {
 }
 
 // Writes the outputs for fragments. `local`: the corner. `low` and `high`: of the whole face, relative to `from`.
-void put_face(uint face, uint type, uint instance, vec3 local, vec3 low, vec3 high, ivec3 from, float openness) {
+// `shown`: the face of the type that has its texture.
+void put_face(uint face, uint shown, uint type, uint instance, vec3 local, vec3 low, vec3 high, ivec3 from,
+              float openness) {
   int u = kFaceU[face];
   int v = kFaceV[face];
   place = vec4(local, openness);
@@ -83,6 +85,6 @@ void put_face(uint face, uint type, uint instance, vec3 local, vec3 low, vec3 hi
   what = uvec2(face, instance);
   colour = vec4(0.0);
   if (kTraces) return;
-  Surface surface = surface_at_corner(face, type);
+  Surface surface = surface_at_corner(shown, type);
   colour = colour_of_face(face, surface, instance, sunlight_of(diffuse_of(face, instance)), openness);
 }

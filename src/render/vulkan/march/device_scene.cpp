@@ -71,9 +71,12 @@ bool can_be_traced(const Scene& scene, const Instance& instance, const SceneGrid
 
 const char* const kSendingTextures = "uploading textures";
 
-ShaderTexturedFace shader_face(const FaceTexels& face, std::uint64_t address) {
+ShaderTexturedFace shader_face(const VoxelFace& of, const FaceTexels& face, std::uint64_t address) {
   const auto axis = [&](std::size_t i) { return std::uint32_t{face.axis[i]} | (face.scale[i] < 0.0 ? 4U : 0U); };
-  return {address, face.log_size | axis(0) << 4 | axis(1) << 8, 0, Vec4(face.tint, face.emission)};
+  const std::uint32_t use = static_cast<std::uint32_t>(of.alpha) << 12 | std::uint32_t{of.turn} << 16 |
+                            (of.mirrored ? std::uint32_t{1} << 18 : 0);
+  return {address, face.log_size | axis(0) << 4 | axis(1) << 8 | use, packed_colour(of.tint),
+          Vec4(face.tint, face.emission)};
 }
 
 // Returns the words of a type's six faces that hold its TriplanarRule: field_textures.glsl.
@@ -422,12 +425,13 @@ Status DeviceTextures::try_put(const VoxelRegistry& types) {
   std::vector<std::shared_ptr<const DeviceTexels>> used;
   for (std::size_t i = 0; types.has_textures() && i < types.size(); ++i) {
     const VoxelProperties& type = types[static_cast<VoxelType>(i)];
-    if (type.faces.empty() || type.visibility != Visibility::Opaque) continue;
+    if (type.faces.empty()) continue;
     const std::array<std::uint32_t, 6> rule = words_of(TriplanarRule(type.field_textures));
     for (const Direction direction : kDirections) {
       const auto address = send_texels(*memory_, *known_, type.faces[direction].texture, used);
       if (!address) return address.error();
-      faces.push_back(shader_face(face_texels(type.faces[direction], direction, emission_of(type)), *address));
+      const VoxelFace& face = type.faces[direction];
+      faces.push_back(shader_face(face, face_texels(face, direction, emission_of(type)), *address));
       faces.back().on_fields = rule[static_cast<std::size_t>(direction)];
     }
     numbers[i] = static_cast<std::uint32_t>(faces.size() / kDirections.size());

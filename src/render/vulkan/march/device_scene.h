@@ -82,11 +82,12 @@ class DeviceTexels {
 
 /// Finds textures in device memory, so that a renderer and its mesh renderers hold each texture once.
 using KnownTexels = std::map<const Rgba8*, std::weak_ptr<const DeviceTexels>>;
-/// Sends a texture unless it is known, and adds it to `used`. Returns the address of its texels.
+/// Returns the address of a texture's texels, and adds them to `used`. Queues them for the next `flush` unless they are
+/// known. Errors: as DeviceTexels::send.
 [[nodiscard]] Result<std::uint64_t> send_texels(ShaderMemory& memory, KnownTexels& all, const Texture& texture,
                                                 std::vector<std::shared_ptr<const DeviceTexels>>& used);
 
-/// The textures of opaque types in device memory: texels, and a table of faces. Shaders follow the addresses of texels,
+/// The textures of types' faces in device memory: texels, and a table of faces. Shaders follow the addresses of texels,
 /// so there are no limits of layers, sizes or numbers, except the memory.
 class DeviceTextures {
  public:
@@ -100,7 +101,7 @@ class DeviceTextures {
   /// Cost: O(types), if any type changed.
   [[nodiscard]] Status put(const VoxelRegistry& types);
 
-  /// Returns true if no opaque type has textures. Images then need no shaders for textures.
+  /// Returns true if no type has textures. Images then need no shaders for textures.
   [[nodiscard]] bool empty() const { return texels_.empty(); }
   /// Sets the addresses of a frame. Requires: the frame's types are those of the last `put`.
   void put_in(ShaderFrame& frame) const;

@@ -25,7 +25,11 @@ inline std::shared_ptr<ChunkSurface> blocky_surface(const Grid& grid, const Voxe
   auto surface = std::make_shared<ChunkSurface>();
   QuadOptions options;
   options.merge = merge;
-  BlockyMesher().mesh(grid.neighbourhood(chunk), types, options, surface->quads);
+  BlockyMesher().mesh(grid.neighbourhood(chunk), types, options, surface->quads, surface->shapes);
+  const auto clear = std::stable_partition(surface->shapes.begin(), surface->shapes.end(), [&](const ShapeFace& face) {
+    return types[face.type].visibility != Visibility::Transparent;
+  });
+  surface->opaque_shapes = static_cast<std::size_t>(clear - surface->shapes.begin());
   const auto glass = std::stable_partition(surface->quads.begin(), surface->quads.end(),
                                            [&](const Quad& quad) { return !types.is_transparent(quad.type()); });
   surface->opaque_quads = static_cast<std::size_t>(glass - surface->quads.begin());

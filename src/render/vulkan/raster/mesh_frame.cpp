@@ -215,9 +215,9 @@ ShaderMeshInstance shader_instance(const Space& space, const View& view, const E
   return out;
 }
 
-// Returns the distance of a quad's middle.
-float distance_of(const Quad& quad, const MeshDraw& draw, const Space& space, const View& view) {
-  const DVec3 middle = DVec3(draw.offset) + 0.5 * DVec3(quad.corner(0) + quad.corner(2));
+// Returns the distance of a point of a chunk.
+float distance_of(DVec3 in_chunk, const MeshDraw& draw, const Space& space, const View& view) {
+  const DVec3 middle = DVec3(draw.offset) + in_chunk;
   if (view.rays.is_perspective()) {
     return static_cast<float>(glm::length(middle - space.eye) * space.instance->voxel_size);
   }
@@ -230,35 +230,55 @@ bool faces_camera(const Quad& quad, const MeshDraw& draw, const Space& space, co
       view.rays.is_perspective() ? static_cast<double>(draw.offset[frame.axis]) + quad.corner(0)[frame.axis] : 0.0;
   return frame.sign * (space.eye[frame.axis] - plane) > 0.0;
 }
+bool faces_camera(const GlassShape& shape, const MeshDraw& draw, const Space& space, const View& view) {
+  const DVec3 point = view.rays.is_perspective() ? DVec3(draw.offset) + DVec3(shape.centre) : DVec3(0.0);
+  return glm::dot(DVec3(shape.normal), space.eye - point) > 0.0;
+}
 
-void order_glass(std::span<const Space> spaces, const View& view, MeshFrameData& data) {
+struct GlassEntry {
+  float distance;
+  ShaderGlassQuad quad;
+};
+
+// Lists the glass of a draw that faces the camera.
+void add_glass(const MeshDraw& draw, const Space& space, const View& view, const SolidFaces& solid,
+               std::uint32_t number, std::vector<GlassEntry>& entries) {
+  const StoredMesh& mesh = *draw.mesh;
+  for (std::size_t i = 0; i < mesh.glass.size(); ++i) {
+    const Quad& quad = mesh.glass[i];
+    if (solid.contains(quad) || !faces_camera(quad, draw, space, view)) continue;
+    const DVec3 middle = 0.5 * DVec3(quad.corner(0) + quad.corner(2));
+    entries.push_back(
+        {distance_of(middle, draw, space, view), {number, mesh.opaque.back() + static_cast<std::uint32_t>(i)}});
+  }
+  for (const GlassShape& shape : mesh.shapes.glass) {
+    if (solid.contains(shape.type, shape.look) || !faces_camera(shape, draw, space, view)) continue;
+    entries.push_back({distance_of(DVec3(shape.centre), draw, space, view), {number, shape.number | kGlassIsShape}});
+  }
+}
+
+void order_glass(std::span<const Space> spaces, const View& view, const SolidFaces& solid, MeshFrameData& data) {
   for (const MeshDraw& draw : data.draws) {
-    data.glass_quads += draw.mesh->glass.size();
-    data.has_smooth_glass |= draw.mesh->glass_indices > 0;
+    const StoredMesh& mesh = *draw.mesh;
+    data.glass_quads += mesh.glass.size() + mesh.shapes.glass.size();
+    data.has_smooth_glass |= mesh.glass_indices > 0;
+    data.has_shape_glass |= !mesh.shapes.glass.empty();
   }
   if (data.glass_by_rays || data.glass_quads > kMaxOrdered) return;
-  struct Entry {
-    float distance;
-    ShaderGlassQuad quad;
-  };
-  std::vector<Entry> entries;
+  std::vector<GlassEntry> entries;
   for (const MeshDraw& draw : data.draws) {
-    if (draw.mesh->glass.empty()) continue;
+    const StoredMesh& mesh = *draw.mesh;
+    if (mesh.glass.empty() && mesh.shapes.glass.empty()) continue;
+    QUOIN_ASSERT(draw.instance < spaces.size(), "an instance of the frame");
     const auto number = static_cast<std::uint32_t>(data.glass.size());
-    data.glass.push_back({draw.mesh->place.address, draw.instance, 0, Vec4(draw.offset, 0.0F)});
-    for (std::size_t i = 0; i < draw.mesh->glass.size(); ++i) {
-      const Quad& quad = draw.mesh->glass[i];
-      QUOIN_ASSERT(draw.instance < spaces.size(), "an instance of the frame");
-      const Space& space = spaces[draw.instance];
-      if (!faces_camera(quad, draw, space, view)) continue;
-      entries.push_back(
-          {distance_of(quad, draw, space, view), {number, draw.mesh->opaque.back() + static_cast<std::uint32_t>(i)}});
-    }
+    data.glass.push_back(
+        {mesh.place.address, draw.instance, 0, Vec4(draw.offset, 0.0F), mesh.shapes.records, mesh.shapes.faces});
+    add_glass(draw, spaces[draw.instance], view, solid, number, entries);
   }
   std::stable_sort(entries.begin(), entries.end(),
-                   [](const Entry& a, const Entry& b) { return a.distance > b.distance; });
+                   [](const GlassEntry& a, const GlassEntry& b) { return a.distance > b.distance; });
   data.order.reserve(entries.size());
-  for (const Entry& entry : entries) data.order.push_back(entry.quad);
+  for (const GlassEntry& entry : entries) data.order.push_back(entry.quad);
 }
 
 void set_frame(const View& view, const Environment& environment, MeshFrameData& data) {
@@ -274,6 +294,24 @@ bool is_flat(const Camera& camera) {
 }
 
 }  // namespace
+
+SolidFaces SolidFaces::of(const VoxelRegistry& types) {
+  SolidFaces solid;
+  for (std::size_t i = 0; i < types.size(); ++i) {
+    const VoxelProperties& type = types[static_cast<VoxelType>(i)];
+    if (type.visibility != Visibility::Transparent) continue;
+    std::uint8_t faces = 0;
+    for (const Direction direction : kDirections) {
+      if (type.faces.empty() || type.faces[direction].alpha == FaceAlpha::Translucent) continue;
+      faces = static_cast<std::uint8_t>(faces | 1U << static_cast<unsigned>(direction));
+    }
+    if (type.faces.empty()) continue;
+    solid.by_type.resize(types.size());
+    solid.by_type[i] = faces;
+    solid.has_any |= faces != 0;
+  }
+  return solid;
+}
 
 QuadRuns visible_quads(const MeshDraw& draw, bool with_glass) {
   QUOIN_ASSERT(draw.mesh != nullptr, "a mesh to draw");
@@ -298,15 +336,19 @@ std::int64_t MeshFrameData::triangles() const {
   for (const MeshDraw& draw : draws) {
     count += draw.mesh->indices / 3;
     for (const auto& [first, end] : visible_quads(draw, !is_ordered)) count += 2 * std::int64_t{end - first};
+    if (!draw.is_far) count += std::int64_t{2} * draw.mesh->shapes.count;
   }
   return count;
 }
 
 Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInstance> instances, const Camera& camera,
-                                      const RenderOptions& options, int subpixels, bool glass_by_rays) {
+                                      const RenderOptions& options, int subpixels, bool glass_by_rays,
+                                      const SolidFaces& solid) {
   if (is_flat(camera)) return make_error(ErrorCode::InvalidArgument, "camera: directions must not lie in one plane");
   MeshFrameData data;
   data.glass_by_rays = glass_by_rays;
+  data.has_cutouts = solid.has_any;
+  data.has_textured_glass = !solid.by_type.empty();
   View view(camera, options);
   std::vector<Space> spaces;
   const auto keep = [&](const Space& space) {
@@ -335,7 +377,7 @@ Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInst
   std::stable_sort(data.far.begin(), data.far.end(), is_nearer);
   set_frame(view, *options.environment, data);
   // When values are shown instead of colours, transparent surfaces are drawn like opaque ones.
-  if (!shows_values(options.light.shading)) order_glass(spaces, view, data);
+  if (!shows_values(options.light.shading)) order_glass(spaces, view, solid, data);
   return data;
 }
 

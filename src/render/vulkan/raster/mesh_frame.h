@@ -79,6 +79,26 @@ struct FarDraw {
 /// none.
 [[nodiscard]] QuadRuns visible_quads(const MeshDraw& draw, bool with_glass);
 
+/// The faces of transparent types that hide the background, where their texels are visible: cutout and opaque ones.
+struct SolidFaces {
+  std::vector<std::uint8_t> by_type;  ///< a bit per direction; empty if no transparent type has textures
+  bool has_any = false;
+
+  [[nodiscard]] static SolidFaces of(const VoxelRegistry& types);
+  /// Returns true if a type that is transparent has other faces.
+  [[nodiscard]] bool leaves_glass(VoxelType type) const {
+    constexpr std::uint8_t kAll = 63;
+    return type >= by_type.size() || by_type[type] != kAll;
+  }
+  [[nodiscard]] bool contains(VoxelType type, std::size_t face) const {
+    return type < by_type.size() && (by_type[type] >> face & 1U) != 0;
+  }
+  [[nodiscard]] bool contains(const Quad& quad) const {
+    if (!has_any) return false;
+    return contains(quad.type(), static_cast<std::size_t>(quad.orientation().inverse().apply(quad.direction())));
+  }
+};
+
 /// The data for drawing one image, without memory addresses.
 struct MeshFrameData {
   FrameData image;  ///< the rays' content, and light
@@ -88,16 +108,21 @@ struct MeshFrameData {
   std::vector<ShaderMeshInstance> instances;
   std::vector<MeshDraw> draws;  ///< the nearest first
   std::vector<FarDraw> far;     ///< of the far instances, in the same form
-  /// Transparent quads, farthest first, by their centres. Empty if there are more than `kMaxOrdered`, or if rays find
-  /// transparent surfaces: chunks are then drawn in their order, each with its quads in stored order.
+  /// Transparent quads and faces of shapes, farthest first, by their centres. Empty if there are more than
+  /// `kMaxOrdered`, or if rays find transparent surfaces: chunks are then drawn in their order, each with its quads in
+  /// stored order.
   std::vector<ShaderGlassQuad> order;
   std::vector<ShaderGlassDraw> glass;  ///< the draws that `order` refers to
   std::vector<ShaderLamp> lamps;
-  std::size_t glass_quads = 0;
+  std::size_t glass_quads = 0;  ///< and faces of shapes
+  bool has_shape_glass = false;
   bool has_smooth_glass = false;
-  bool has_fields = false;     ///< among the placed content
-  bool has_shapes = false;     ///< among the placed content
-  bool has_textures = false;   ///< colours are shown, and opaque types have textures
+  bool has_fields = false;          ///< among the placed content
+  bool has_shapes = false;          ///< among the placed content
+  bool has_textures = false;        ///< colours are shown, and types have textures
+  bool has_type_textures = false;   ///< types have textures
+  bool has_cutouts = false;         ///< quads of transparent types have textures that hide the background
+  bool has_textured_glass = false;  ///< transparent types have textures
   bool glass_by_rays = false;  ///< only the nearest glass of a pixel is drawn, including everything visible through it
 
   [[nodiscard]] bool has(std::uint32_t flag) const { return (image.frame.flags & flag) != 0; }
@@ -115,11 +140,12 @@ constexpr std::size_t kMaxOrdered = std::size_t{1} << 20;
 ///        chunk.
 /// `subpixels`: the device's subpixel positions per pixel and axis.
 /// `glass_by_rays`: as in the result; if values are shown, glass is drawn like opaque surfaces.
+/// `solid`: faces that are not glass.
 /// The caller fills in `image`. Requires: `check` accepts the camera and the options.
 /// Errors: InvalidArgument for a camera whose axes lie in one plane.
 /// Cost: O(chunks of the instances), and sorting the visible chunks and the transparent quads.
 [[nodiscard]] Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInstance> instances,
                                                     const Camera& camera, const RenderOptions& options, int subpixels,
-                                                    bool glass_by_rays);
+                                                    bool glass_by_rays, const SolidFaces& solid);
 
 }  // namespace quoin::vulkan

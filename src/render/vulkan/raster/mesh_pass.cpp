@@ -155,8 +155,10 @@ struct MeshPass::Step {
   std::uint32_t mode = kDrawSurfaces;
   VkPipeline blocky = VK_NULL_HANDLE;  // or the sky's
   std::array<VkPipeline, 2> smooth{};  // mirrored: 1
-  VkPipeline far = VK_NULL_HANDLE;     // impostors
-  bool is_backwards = false;           // keeps the result for equally near surfaces: the first in normal order wins
+  VkPipeline cutouts = VK_NULL_HANDLE;
+  VkPipeline shapes = VK_NULL_HANDLE;
+  VkPipeline far = VK_NULL_HANDLE;  // impostors
+  bool is_backwards = false;        // keeps the result for equally near surfaces: the first in normal order wins
   Styles styles = Styles::All;
 
   [[nodiscard]] bool is_glass() const { return over == Over::GlassInOrder || over == Over::GlassByChunk; }
@@ -164,6 +166,16 @@ struct MeshPass::Step {
     const SurfaceStyle style = draw.mesh->style;
     if (styles != Styles::All && (styles == Styles::Smooth) != (style == SurfaceStyle::Smooth)) return false;
     return is_glass() ? draw.mesh->has_glass() : !(draw.is_far && over == Over::Opaque);
+  }
+  // Quads of transparent types are drawn with their textures, apart from the others.
+  [[nodiscard]] bool has_cutouts(const MeshFrameData& data) const {
+    return data.has_cutouts && !is_glass() && (mode == kDrawSurfaces || mode == kDrawDepth);
+  }
+  [[nodiscard]] bool draws(const MeshDraw& draw, MeshFaces faces) const {
+    const StoredMesh& mesh = *draw.mesh;
+    if (faces == MeshFaces::Cutouts) return !mesh.glass.empty();
+    if (styles == Styles::Smooth || mesh.shapes.count == 0) return false;
+    return is_glass() ? !mesh.shapes.glass.empty() : !draw.is_far;
   }
 };
 
@@ -332,13 +344,18 @@ Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples,
     const bool is_coloured = data.has_textures && step.mode == kDrawSurfaces && step.over != Step::Over::Sky;
     const auto has_materials = [](const MeshDraw& draw) { return draw.mesh->with_materials != 0; };
     const bool is_coloured_smooth = is_coloured && std::ranges::any_of(data.draws, has_materials);
+    const bool has_edges = step.mode == kDrawEdgesOver || step.mode == kDrawEdgesOnly;
+    const bool is_textured_glass = data.has_textured_glass && step.is_glass() && !has_edges;
+    const bool is_mixed = step.over == Step::Over::GlassInOrder && data.has_shape_glass;
     MeshLight lit = is_lit ? light : MeshLight::Plain;
     if (is_nearest_glass(step.mode)) lit = data.glass_by_rays ? MeshLight::TracedThroughGlass : light;
-    const auto find = [&](MeshWay::What what, bool mirrored, VkPipeline& out) -> Status {
-      const auto found = pipelines_->pipeline({what, step.mode, mirrored, step.over == Step::Over::GlassInOrder, lit,
-                                               data.glass_by_rays && is_nearest_glass(step.mode),
-                                               lit != MeshLight::Plain && data.has_fields,
-                                               what == MeshWay::What::Smooth ? is_coloured_smooth : is_coloured,
+    const auto find = [&](MeshWay::What what, bool mirrored, VkPipeline& out,
+                          MeshFaces faces = MeshFaces::Quads) -> Status {
+      bool reads_textures = what == MeshWay::What::Smooth ? is_coloured_smooth : is_coloured || is_textured_glass;
+      if (faces != MeshFaces::Quads) reads_textures = data.has_type_textures && !has_edges;
+      const auto found = pipelines_->pipeline({what, step.mode, mirrored, step.over == Step::Over::GlassInOrder, faces,
+                                               lit, data.glass_by_rays && is_nearest_glass(step.mode),
+                                               lit != MeshLight::Plain && data.has_fields, reads_textures,
                                                lit != MeshLight::Plain && data.has_shapes, samples});
       if (!found) return found.error();
       out = *found;
@@ -354,7 +371,17 @@ Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples,
       const bool is_smooth = draw.mesh->style == SurfaceStyle::Smooth;
       VkPipeline& pipeline = is_smooth ? step.smooth[draw.mirrored ? 1 : 0] : step.blocky;
       const auto what = is_smooth ? MeshWay::What::Smooth : MeshWay::What::Blocky;
-      if (pipeline == VK_NULL_HANDLE) done = find(what, is_smooth && draw.mirrored, pipeline);
+      const MeshFaces faces = is_mixed && !is_smooth ? MeshFaces::Mixed : MeshFaces::Quads;
+      if (pipeline == VK_NULL_HANDLE) done = find(what, is_smooth && draw.mirrored, pipeline, faces);
+    }
+    const auto any_draws = [&](MeshFaces faces) {
+      return std::ranges::any_of(data.draws, [&](const MeshDraw& draw) { return step.draws(draw, faces); });
+    };
+    if (done && step.has_cutouts(data) && any_draws(MeshFaces::Cutouts)) {
+      done = find(MeshWay::What::Blocky, false, step.cutouts, MeshFaces::Cutouts);
+    }
+    if (done && step.over != Step::Over::GlassInOrder && any_draws(MeshFaces::Shapes)) {
+      done = find(MeshWay::What::Blocky, false, step.shapes, MeshFaces::Shapes);
     }
     if (done && !step.is_glass() && !data.far.empty()) done = find(MeshWay::What::Far, false, step.far);
     if (!done) return done;
@@ -426,9 +453,50 @@ void MeshPass::record_step(VkCommandBuffer commands, const MeshFrameData& data, 
   if (step.is_backwards) {
     draw_far(commands, data, step);
     bind_corners(commands);
+    draw_others(commands, data, step, MeshFaces::Shapes);
+    draw_others(commands, data, step, MeshFaces::Cutouts);
   }
   draw_chunks(commands, data, step, values);
-  if (!(step.is_glass() || step.is_backwards)) draw_far(commands, data, step);
+  if (step.is_backwards) return;
+  draw_others(commands, data, step, MeshFaces::Cutouts);
+  draw_others(commands, data, step, MeshFaces::Shapes);
+  if (!step.is_glass()) draw_far(commands, data, step);
+}
+
+void MeshPass::draw_others(VkCommandBuffer commands, const MeshFrameData& data, const Step& step,
+                           MeshFaces faces) const {
+  const bool are_shapes = faces == MeshFaces::Shapes;
+  const VkPipeline pipeline = are_shapes ? step.shapes : step.cutouts;
+  if (pipeline == VK_NULL_HANDLE) return;
+  device_->api().vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipeline);
+  bind_corners(commands);
+  const bool is_backwards = step.is_glass() || step.is_backwards;
+  for (std::size_t i = 0; i < data.draws.size(); ++i) {
+    const MeshDraw& draw = data.draws[is_backwards ? data.draws.size() - 1 - i : i];
+    if (!step.draws(draw, faces)) continue;
+    const StoredMesh& mesh = *draw.mesh;
+    const ShaderMeshInstance& instance = data.instances[draw.instance];
+    ShaderMeshPush values = data.push;
+    values.numbers |= step.mode;
+    values.clip = instance.clip;
+    values.eye = instance.eye;
+    values.room = instance.room;
+    values.offset = {draw.offset.x, draw.offset.y, draw.offset.z};
+    values.instance = draw.instance;
+    values.data = are_shapes ? mesh.shapes.records : mesh.place.address;
+    values.far_faces = mesh.shapes.faces;
+    const std::uint32_t first = are_shapes ? mesh.shapes.opaque : mesh.opaque.back();
+    const std::uint32_t end = are_shapes ? mesh.shapes.count : first + static_cast<std::uint32_t>(mesh.glass.size());
+    if (are_shapes && !step.is_glass() && first > 0) {
+      push(commands, values);
+      draw_quads(commands, 0, first);
+    }
+    if (first == end) continue;
+    values.numbers |= kMeshIsTransparent;
+    if (step.over == Step::Over::Opaque) values.numbers |= kMeshSolidOnly;
+    push(commands, values);
+    draw_quads(commands, first, end);
+  }
 }
 
 void MeshPass::draw_chunks(VkCommandBuffer commands, const MeshFrameData& data, const Step& step,
@@ -497,7 +565,8 @@ void MeshPass::draw_mesh(VkCommandBuffer commands, const MeshDraw& draw, const S
   const auto all = opaque + static_cast<std::uint32_t>(mesh.glass.size());
   if (step.is_glass()) return draw_quads(commands, opaque, all);
   if (step.mode == kDrawEdgesOnly) return draw_quads(commands, draw.is_far ? opaque : 0, all);
-  for (const auto& [first, end] : visible_quads(draw, step.over == Step::Over::All)) draw_quads(commands, first, end);
+  const bool with_glass = step.over == Step::Over::All && step.cutouts == VK_NULL_HANDLE;
+  for (const auto& [first, end] : visible_quads(draw, with_glass)) draw_quads(commands, first, end);
 }
 
 void MeshPass::draw_quads(VkCommandBuffer commands, std::uint32_t first, std::uint32_t end) const {

@@ -112,6 +112,8 @@ class MeshPass {
   void record_step(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const;
   // Draws the step's chunks; `values` has the shared push constants.
   void draw_chunks(VkCommandBuffer commands, const MeshFrameData& data, const Step& step, ShaderMeshPush values) const;
+  // Draws quads of transparent types that hide the background, and shapes.
+  void draw_others(VkCommandBuffer commands, const MeshFrameData& data, const Step& step, MeshFaces faces) const;
   void draw_far(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const;
   void draw_mesh(VkCommandBuffer commands, const MeshDraw& draw, const Step& step) const;
   void draw_quads(VkCommandBuffer commands, std::uint32_t first, std::uint32_t end) const;

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "render/vulkan/device/device.h"
+#include "render/vulkan/raster/mesh_shader_data.h"
 
 namespace quoin::vulkan {
 
@@ -28,10 +29,11 @@ struct MeshWay {
   std::uint32_t mode = 0;
   bool mirrored = false;  ///< smooth: the instance turns triangles round; blocky faces are culled by their shader
   bool ordered = false;   ///< blocky: quads of many chunks, in the order stored in memory
+  MeshFaces faces = MeshFaces::Quads;  ///< blocky
   MeshLight light = MeshLight::Plain;
   bool glass_by_rays = false;  ///< the nearest glass includes everything visible through it
   bool fields = false;         ///< rays may meet fields
-  bool textures = false;       ///< opaque surfaces show textures
+  bool textures = false;       ///< the textures of types are read
   bool shapes = false;         ///< rays may meet shapes
   std::uint32_t samples = 1;
 

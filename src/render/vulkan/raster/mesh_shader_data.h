@@ -28,19 +28,22 @@ struct ShaderGlassDraw {
   std::uint32_t instance = 0;
   std::uint32_t pad = 0;
   Vec4 offset{0.0F};
+  std::uint64_t records = 0;  ///< of the chunk's shapes
+  std::uint64_t shapes = 0;   ///< their faces
 };
 
-/// A transparent quad in the order of drawing.
+/// A transparent quad, or face of a shape, in the order of drawing.
 struct ShaderGlassQuad {
   std::uint32_t draw = 0;
-  std::uint32_t quad = 0;
+  std::uint32_t quad = 0;  ///< and kGlassIsShape
 };
+constexpr std::uint32_t kGlassIsShape = std::uint32_t{1} << 31;
 
 struct ShaderMeshFrame {
   std::uint64_t frame = 0;  ///< a ShaderFrame
   std::uint64_t draws = 0;
   std::uint64_t order = 0;
-  std::uint64_t pad = 0;
+  std::uint64_t emissions = 0;
   Vec4 sun{0.0F};
 };
 
@@ -66,6 +69,39 @@ constexpr int kMeshVerticesShift = 4;
 constexpr int kMeshShareShift = 4;
 constexpr std::uint32_t kMeshIsCoarser = std::uint32_t{1} << 28;
 constexpr std::uint32_t kMeshHasCells = std::uint32_t{1} << 29;
+// For other content: its types are transparent; only their faces that hide the background are drawn.
+constexpr std::uint32_t kMeshIsTransparent = std::uint32_t{1} << 30;
+constexpr std::uint32_t kMeshSolidOnly = std::uint32_t{1} << 31;
+
+/// The faces of blocky meshes that a pipeline draws: `kPart` of the shaders.
+enum class MeshFaces : std::uint8_t { Quads, Cutouts, Shapes, Mixed };
+
+// Mirrors src/render/shaders/raster/shape.glsl.
+
+/// A face of a shape's model.
+struct ShaderShapeRecord {
+  std::array<Vec4, 4> corners{};
+  Vec4 down{0.0F};
+  Vec4 normal{0.0F};
+  std::uint64_t texels = 0;
+  std::uint32_t bits = 0;
+  std::uint32_t tint = 0;
+};
+constexpr int kAlphaShift = 12;
+constexpr std::uint32_t kOwnLook = std::uint32_t{1} << 14;
+constexpr int kTypeLookShift = 19;
+constexpr int kNormalShift = 22;
+constexpr std::uint32_t kIsOpen = std::uint32_t{1} << 25;
+constexpr std::uint32_t kIsPlate = std::uint32_t{1} << 26;
+
+/// A visible face of a shape.
+struct ShaderShapeFace {
+  std::uint32_t bits = 0;
+  std::uint32_t type = 0;
+};
+constexpr std::uint32_t kShapeIsFlipped = std::uint32_t{1} << 26;
+constexpr int kRecordHighShift = 27;
+constexpr std::size_t kMaxShapeRecords = std::size_t{1} << 21;
 
 struct ShaderMeshPush {
   std::array<Vec4, 4> clip{};
@@ -79,7 +115,8 @@ struct ShaderMeshPush {
   std::uint32_t numbers = 0;
 };
 
-static_assert(sizeof(ShaderMeshInstance) == 240 && sizeof(ShaderGlassDraw) == 32 && sizeof(ShaderGlassQuad) == 8);
+static_assert(sizeof(ShaderMeshInstance) == 240 && sizeof(ShaderGlassDraw) == 48 && sizeof(ShaderGlassQuad) == 8);
+static_assert(sizeof(ShaderShapeRecord) == 7 * 16 && sizeof(ShaderShapeFace) == 8);
 static_assert(sizeof(ShaderMeshFrame) == 3 * 16 && sizeof(ShaderMeshPush) == 128);
 
 }  // namespace quoin::vulkan

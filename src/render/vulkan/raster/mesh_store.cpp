@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
+#include <optional>
 #include <utility>
+
+#include <glm/geometric.hpp>
 
 #include <quoin/core/assert.h>
 
@@ -44,6 +48,11 @@ Status check(const ChunkSurface& surface) {
   const auto refuse = [](const char* message) { return make_error(ErrorCode::InvalidArgument, message); };
   if (surface.style == SurfaceStyle::Blocky) {
     if (surface.opaque_quads > surface.quads.size()) return refuse("surface: more opaque quads than quads");
+    if (surface.opaque_shapes > surface.shapes.size()) return refuse("surface: more opaque shapes than shapes");
+    const bool has_faces = std::ranges::all_of(surface.shapes, [](const ShapeFace& shape) {
+      return shape.model != nullptr && shape.face < shape.model->faces.size();
+    });
+    if (!has_faces) return refuse("surface: a shape's face is not one of its model");
     return {};
   }
   const SmoothChunkMesh& mesh = surface.smooth;
@@ -71,6 +80,81 @@ void set_directions(std::span<const Quad> opaque, StoredMesh& mesh) {
         opaque.begin(), opaque.end(), [=](const Quad& quad) { return static_cast<std::size_t>(quad.direction()) < i; });
     mesh.opaque[i] = static_cast<std::uint32_t>(from - opaque.begin());
   }
+}
+
+void set_glass_types(StoredMesh& mesh) {
+  std::vector<VoxelType>& types = mesh.glass_types;
+  const auto add = [&](VoxelType type) {
+    if (types.empty() || types.back() != type) types.push_back(type);
+  };
+  for (const Quad& quad : mesh.glass) add(quad.type());
+  for (const GlassShape& shape : mesh.shapes.glass) add(shape.type);
+  std::ranges::sort(types);
+  types.erase(std::ranges::unique(types).begin(), types.end());
+  types.shrink_to_fit();
+}
+
+// Returns kIsOpen if an element lacks sides, so that the inner sides of the others can be seen; kIsPlate for a plate
+// whose other side is drawn.
+std::uint32_t openness_bits(const ShapeModel& model, std::uint16_t face) {
+  for (const ModelBox& box : model.boxes) {
+    const auto side = std::ranges::find(box.faces, static_cast<std::int16_t>(face));
+    if (side == box.faces.end()) continue;
+    const auto number = static_cast<std::size_t>(side - box.faces.begin());
+    const int axis = static_cast<int>(number / 2);
+    if (box.min[axis] == box.max[axis]) return box.faces[number ^ 1U] < 0 ? kIsOpen : kIsPlate;
+    return std::ranges::any_of(box.faces, [](std::int16_t each) { return each < 0; }) ? kIsOpen : 0;
+  }
+  return 0;
+}
+
+// Returns the square of the sides of the texture per voxel.
+float square_density(const ModelFace& face) {
+  const std::size_t middle = face.corners[1] == face.corners[2] ? 2 : 1;  // a corner may be there twice
+  const Vec3 edge = face.corners[middle] - face.corners[0];
+  const float right = face.uv[middle][0] - face.uv[0][0];
+  const float down = face.uv[middle][1] - face.uv[0][1];
+  return (right * right + down * down) / glm::dot(edge, edge);
+}
+
+// `texels`: address, of the face's own look; 0 if it shows its type's.
+ShaderShapeRecord shape_record(const ShapeModel& model, std::uint16_t number, std::uint64_t texels) {
+  const ModelFace& face = model.faces[number];
+  ShaderShapeRecord record;
+  for (std::size_t i = 0; i < 4; ++i) {
+    record.corners[i] = Vec4(face.corners[i], face.uv[i][0]);
+    record.down[static_cast<int>(i)] = face.uv[i][1];
+  }
+  record.normal = Vec4(face.normal, square_density(face));
+  record.bits = openness_bits(model, number) | static_cast<std::uint32_t>(face.direction) << kNormalShift;
+  if (face.look < 6) {
+    record.bits |= std::uint32_t{face.look} << kTypeLookShift;
+    return record;
+  }
+  const VoxelFace& look = model.looks[face.look - std::size_t{6}];
+  record.texels = texels;
+  record.bits |= kOwnLook | static_cast<std::uint32_t>(look.texture.level_count() - 1) |
+                 static_cast<std::uint32_t>(look.alpha) << kAlphaShift;
+  record.tint = packed_colour(look.tint);
+  return record;
+}
+
+ShaderShapeFace shader_face(const ShapeFace& face, std::size_t record) {
+  const bool flips = !face.is_triangle() && flips_diagonal(face.occlusion());
+  const auto number = static_cast<std::uint32_t>(record);
+  return {(face.bits & (kShapeIsFlipped - 1)) | (flips ? kShapeIsFlipped : 0) | number >> 16U << kRecordHighShift,
+          face.type | number << 16U};
+}
+
+// Returns a face of transparent material as glass; nullopt if its own look hides the background.
+std::optional<GlassShape> glass_shape(const ShapeFace& face, std::size_t number) {
+  const ModelFace& shown = face.model_face();
+  if (shown.look >= 6 && face.model->looks[shown.look - std::size_t{6}].alpha != FaceAlpha::Translucent) {
+    return std::nullopt;
+  }
+  const Vec3 centre = 0.5F * (face.corner(0) + face.corner(2));
+  return GlassShape{centre, shown.normal, static_cast<std::uint32_t>(number), face.type,
+                    static_cast<std::uint8_t>(std::min<std::uint16_t>(shown.look, 6))};
 }
 
 }  // namespace
@@ -134,6 +218,11 @@ Status MeshStore::upload(const ChunkSurface& surface, StoredMesh& mesh) {
     const auto glass = quads.subspan(surface.opaque_quads);
     mesh.glass.assign(glass.begin(), glass.end());
     bytes = std::as_bytes(quads);
+    if (!surface.shapes.empty()) {
+      if (Status done = add_shapes(surface, words, mesh); !done) return done;
+      bytes = std::as_bytes(std::span(words));
+    }
+    set_glass_types(mesh);
   } else {
     const SmoothChunkMesh& smooth = surface.smooth;
     mesh.indices = static_cast<std::uint32_t>(smooth.indices.size());
@@ -154,7 +243,63 @@ Status MeshStore::upload(const ChunkSurface& surface, StoredMesh& mesh) {
   const auto place = memory_->allocate(bytes.size(), "uploading meshes");
   if (!place) return place.error();
   mesh.place = *place;
+  mesh.shapes.records += place->address;
+  mesh.shapes.faces += place->address;
   return memory_->write(mesh.place, bytes);
+}
+
+namespace {
+
+void append_words(std::span<const std::byte> bytes, std::size_t alignment, std::vector<std::uint32_t>& words) {
+  QUOIN_ASSERT(bytes.size() % sizeof(std::uint32_t) == 0 && alignment % sizeof(std::uint32_t) == 0, "whole words");
+  const std::size_t step = alignment / sizeof(std::uint32_t);
+  const std::size_t first = (words.size() + step - 1) / step * step;
+  words.resize(first + bytes.size() / sizeof(std::uint32_t));
+  if (!bytes.empty()) std::memcpy(words.data() + first, bytes.data(), bytes.size());
+}
+
+std::uint64_t bytes_in(const std::vector<std::uint32_t>& words) {
+  return words.size() * sizeof(std::uint32_t);
+}
+
+}  // namespace
+
+// Writes quads, the faces of models that occur, each once, and the faces of shapes. Addresses count from the first one.
+Status MeshStore::add_shapes(const ChunkSurface& surface, std::vector<std::uint32_t>& words, StoredMesh& mesh) {
+  std::map<std::pair<const ShapeModel*, std::uint16_t>, std::size_t> known;
+  std::vector<ShaderShapeRecord> records;
+  std::vector<ShaderShapeFace> faces;
+  faces.reserve(surface.shapes.size());
+  StoredShapes& shapes = mesh.shapes;
+  for (const ShapeFace& face : surface.shapes) {
+    const auto [record, is_new] = known.try_emplace({face.model, face.face}, records.size());
+    if (is_new) {
+      const ModelFace& shown = face.model_face();
+      std::uint64_t texels = 0;
+      if (shown.look >= 6) {
+        const VoxelFace& look = face.model->looks[shown.look - std::size_t{6}];
+        const auto address = send_texels(*memory_, *known_, look.texture, shapes.texels);
+        if (!address) return address.error();
+        texels = *address;
+      }
+      records.push_back(shape_record(*face.model, face.face, texels));
+    }
+    if (faces.size() >= surface.opaque_shapes) {
+      if (const auto glass = glass_shape(face, faces.size())) shapes.glass.push_back(*glass);
+    }
+    faces.push_back(shader_face(face, record->second));
+  }
+  if (records.size() > kMaxShapeRecords) {
+    return make_error(ErrorCode::LimitExceeded, "surface: more than 2,097,152 different faces of shapes in a chunk");
+  }
+  append_words(std::as_bytes(std::span(surface.quads)), sizeof(Quad), words);
+  append_words(std::as_bytes(std::span(records)), ShaderMemory::kAlignment, words);
+  shapes.records = bytes_in(words) - std::as_bytes(std::span(records)).size();
+  append_words(std::as_bytes(std::span(faces)), sizeof(ShaderShapeFace), words);
+  shapes.faces = bytes_in(words) - std::as_bytes(std::span(faces)).size();
+  shapes.count = static_cast<std::uint32_t>(faces.size());
+  shapes.opaque = static_cast<std::uint32_t>(surface.opaque_shapes);
+  return {};
 }
 
 // Replaces the old surfaces by the new ones; keeps the old ones on failure.
@@ -223,7 +368,7 @@ const MeshStore::StoredGrid* MeshStore::find(MeshKey key) {
     for (const auto& [at, mesh] : grid.chunks) {
       grid.low = glm::min(grid.low, at);
       grid.high = glm::max(grid.high, at);
-      grid.opaque_quads += mesh.opaque.back() + mesh.indices / 6;
+      grid.opaque_quads += mesh.opaque.back() + mesh.shapes.opaque + mesh.indices / 6;
       grid.bytes += mesh.place.size;
     }
     grid.bounds_known = true;

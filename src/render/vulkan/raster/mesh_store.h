@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <map>
@@ -14,9 +15,29 @@
 
 #include "render/chunks/surface_source.h"
 #include "render/vulkan/device/device_memory.h"
+#include "render/vulkan/march/device_scene.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin::vulkan {
+
+/// A face of a shape that may be glass, to be sorted for each image.
+struct GlassShape {
+  Vec3 centre{0.0F};  ///< in chunk coordinates, voxels
+  Vec3 normal{0.0F};
+  std::uint32_t number = 0;  ///< of the face
+  VoxelType type = kAir;
+  std::uint8_t look = 0;  ///< the face of the type that it shows; 6: glass of its own look
+};
+
+/// The faces of a chunk's shapes in device memory.
+struct StoredShapes {
+  std::uint64_t records = 0;  ///< address of the models' faces
+  std::uint64_t faces = 0;    ///< address
+  std::uint32_t count = 0;
+  std::uint32_t opaque = 0;  ///< the first ones are of opaque material
+  std::vector<GlassShape> glass;
+  std::vector<std::shared_ptr<const DeviceTexels>> texels;  ///< of their own looks
+};
 
 /// The surface of a chunk in device memory.
 struct StoredMesh {
@@ -31,11 +52,16 @@ struct StoredMesh {
   VkDeviceSize first_index = 0;
   std::uint32_t with_materials = 0;  ///< number of vertices that materials follow; 0: without materials
   std::vector<Quad> glass;           ///< the transparent quads, to be sorted for each image
+  StoredShapes shapes;               ///< blocky
+  /// The types of `glass` and of `shapes.glass`, each once.
+  std::vector<VoxelType> glass_types;
 
   [[nodiscard]] std::int64_t triangles() const {
-    return std::int64_t{2} * opaque.back() + 2 * static_cast<std::int64_t>(glass.size()) + indices / 3;
+    return std::int64_t{2} * (std::int64_t{opaque.back()} + shapes.count) +
+           2 * static_cast<std::int64_t>(glass.size()) + indices / 3;
   }
-  [[nodiscard]] bool has_glass() const { return !glass.empty() || glass_indices > 0; }
+  /// Returns true if it has surfaces of transparent types.
+  [[nodiscard]] bool has_glass() const { return !glass.empty() || glass_indices > 0 || shapes.count > shapes.opaque; }
 };
 
 /// Identifies meshes: of a grid's voxels, of its halved voxels at a level, or of its field.
@@ -49,8 +75,8 @@ struct MeshKey {
   }
 };
 
-/// Surfaces of chunks in device memory: 8 bytes per quad, or 28 per vertex and 4 per index. Vertices of textured fields
-/// have 12 bytes more.
+/// Surfaces of chunks in device memory: 8 bytes per quad and face of a shape, and 112 per different face of the chunk's
+/// models; or 28 per vertex and 4 per index. Vertices of textured fields have 12 bytes more.
 class MeshStore {
  public:
   static constexpr std::size_t kVertexWords = 7;
@@ -68,7 +94,8 @@ class MeshStore {
     bool bounds_known = false;
   };
 
-  explicit MeshStore(DeviceMemory& memory) : memory_(&memory) {}
+  /// Lifetime: `memory` and `known` must outlive it.
+  MeshStore(DeviceMemory& memory, KnownTexels& known) : memory_(&memory), known_(&known) {}
   ~MeshStore();
   MeshStore(const MeshStore&) = delete;
   MeshStore& operator=(const MeshStore&) = delete;
@@ -85,6 +112,16 @@ class MeshStore {
   [[nodiscard]] std::int64_t triangles() const { return triangles_; }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
   [[nodiscard]] bool has_glass() const { return chunks_with_glass_ > 0; }
+  /// As `has_glass`, for types that have glass (`is_glass`). Cost: O(chunks).
+  template <class IsGlass>
+  [[nodiscard]] bool has_glass(const IsGlass& is_glass) const {
+    return std::ranges::any_of(grids_, [&](const auto& grid) {
+      return std::ranges::any_of(grid.second.chunks, [&](const auto& chunk) {
+        const StoredMesh& mesh = chunk.second;
+        return mesh.glass_indices > 0 || std::ranges::any_of(mesh.glass_types, is_glass);
+      });
+    });
+  }
 
  private:
   struct Change {
@@ -95,11 +132,13 @@ class MeshStore {
 
   Status put_all(std::span<const SurfaceUpdate> surfaces, int level, std::vector<Change>& changes);
   Status upload(const ChunkSurface& surface, StoredMesh& mesh);
+  Status add_shapes(const ChunkSurface& surface, std::vector<std::uint32_t>& words, StoredMesh& mesh);
   Status finish(std::vector<Change>& changes);
   void replace(Change& change);
   void give_back(StoredMesh& mesh);
 
   DeviceMemory* memory_;
+  KnownTexels* known_;
   std::map<MeshKey, StoredGrid> grids_;
   std::size_t chunks_ = 0;
   std::size_t chunks_with_glass_ = 0;

@@ -83,10 +83,13 @@ struct VulkanMeshRenderer::Impl {
         device(of_renderer.device.get()),
         memory(&of_renderer.memory),
         pass(std::move(with_pass)),
-        store(of_renderer.memory),
+        store(of_renderer.memory, of_renderer.texels),
         levels(store),
         textures(of_renderer.memory, of_renderer.texels) {}
-  ~Impl() { memory->release(surfaces); }
+  ~Impl() {
+    memory->release(surfaces);
+    memory->release(emissions);
+  }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
@@ -113,9 +116,12 @@ struct VulkanMeshRenderer::Impl {
   InstanceFilter shown = InstanceFilter::Visible;
   std::vector<vulkan::MeshInstance> instances;  // in the order of their handles; voxels, then the field
   vulkan::Place surfaces;
-  std::vector<Vec4> surface_table;  // the content of `surfaces`
-  bool has_unoccluding = false;     // some of its opaque types do not darken corners
-  vulkan::DeviceTextures textures;  // of the same types
+  std::vector<Vec4> surface_table;    // the content of `surfaces`
+  vulkan::Place emissions;            // of types with shapes
+  std::vector<float> emission_table;  // its content
+  bool has_unoccluding = false;       // some of its opaque types do not darken corners
+  vulkan::DeviceTextures textures;    // of the same types
+  vulkan::SolidFaces solid;           // of the same types
   std::int64_t drawn_triangles = 0;
 };
 
@@ -136,6 +142,7 @@ Status VulkanMeshRenderer::update(const Scene& scene, InstanceFilter filter) {
   impl_->levels.look_at(scene);
   Status done = impl_->put_surfaces(scene.types);
   if (done) done = impl_->textures.put(scene.types);
+  if (done) impl_->solid = vulkan::SolidFaces::of(scene.types);
   if (!done) impl_->surface_table.clear();
   return done;
 }
@@ -169,12 +176,16 @@ void VulkanMeshRenderer::Impl::place(const Scene& of_scene, InstanceFilter filte
 
 Status VulkanMeshRenderer::Impl::put_surfaces(const VoxelRegistry& types) {
   std::vector<Vec4> table = vulkan::surface_table(types);
-  if (table == surface_table) return {};
+  std::vector<float> glow(types.has_shapes() ? types.size() + 1 : 0);
+  for (std::size_t i = 0; i + 1 < glow.size(); ++i) glow[i] = emission_of(types[static_cast<VoxelType>(i)]);
+  if (table == surface_table && glow == emission_table) return {};
   surface_table.clear();
   Status done = vulkan::put_table(*memory, surfaces, std::as_bytes(std::span(table)));
+  if (done && !glow.empty()) done = vulkan::put_table(*memory, emissions, std::as_bytes(std::span(glow)));
   if (done) done = memory->flush();
   if (done) {
     surface_table = std::move(table);
+    emission_table = std::move(glow);
     has_unoccluding = types.has_unoccluding();
   } else {
     memory->discard();
@@ -219,7 +230,8 @@ Status VulkanMeshRenderer::Impl::check_request(const vulkan::ImageImpl& target, 
 
 bool VulkanMeshRenderer::Impl::has_glass_by_rays(const MeshImageOptions& options) const {
   const bool shows_glass = !shows_values(options.light.shading) && options.wireframe != Wireframe::Only;
-  return options.glass_by_rays && shows_glass && store.has_glass() && scene != nullptr;
+  if (!options.glass_by_rays || !shows_glass || !store.has_glass() || scene == nullptr) return false;
+  return !solid.has_any || store.has_glass([this](VoxelType type) { return solid.leaves_glass(type); });
 }
 
 // Returns the instances as drawn in an image; puts the meshes of halved grids into the store.
@@ -276,10 +288,12 @@ Status VulkanMeshRenderer::Impl::put_image(const vulkan::Placement& placement, c
   frame.surfaces = surfaces.address;
   frame.last_surface = static_cast<std::uint32_t>(std::max<std::size_t>(surface_table.size() / 3, 1) - 1);
   if (has_unoccluding) frame.flags |= vulkan::kUnoccluding;
+  data.frame.emissions = emissions.address;
   textures.put_in(frame);
   renderer->scene.put_shapes_in(frame);
   const bool shows_colours = !shows_values(request.light.shading) && !request.detail.colours;
   data.has_textures = shows_colours && !textures.empty();
+  data.has_type_textures = !textures.empty();
   if (scene == nullptr || !traces_light(request)) return {};
   const auto lamps = renderer->lamp_table(request, threads);
   if (!lamps) return lamps.error();
@@ -310,7 +324,7 @@ Result<vulkan::MeshFrameData> VulkanMeshRenderer::Impl::make_frame(const Camera&
   if (surface_table.empty()) instances.clear();
   const auto shown_as = detailed(placement, threads);
   if (!shown_as) return shown_as.error();
-  auto data = vulkan::make_mesh_frame(store, *shown_as, camera, request, pass->subpixels(), glass_by_rays);
+  auto data = vulkan::make_mesh_frame(store, *shown_as, camera, request, pass->subpixels(), glass_by_rays, solid);
   if (!data) return data.error();
   if (Status done = put_image(placement, camera, request, threads, *data); !done) return done.error();
   if (traces) light = placement.has_transparent ? vulkan::MeshLight::TracedThroughGlass : vulkan::MeshLight::Traced;

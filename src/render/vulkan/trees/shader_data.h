@@ -9,6 +9,7 @@
 #include <glm/vec4.hpp>
 
 #include <quoin/core/vec.h>
+#include <quoin/grid/texture.h>
 
 namespace quoin::vulkan {
 
@@ -286,8 +287,10 @@ constexpr std::uint32_t kIsTurnedByState = 1U << 31;
 struct ShaderTexturedFace {
   std::uint64_t texels = 0;
   std::uint32_t shape = 0;
-  std::uint32_t on_fields = 0;
+  std::uint32_t packed_tint = 0;
   Vec4 tint{0.0F};
+  std::uint32_t on_fields = 0;
+  std::array<std::uint32_t, 3> pad{};
 };
 
 struct ShaderPush {
@@ -329,8 +332,13 @@ static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGri
 static_assert(sizeof(ShaderFarFace) == 32 && sizeof(ShaderVoxelFace) == 16 && sizeof(ShaderFar) == 21 * 16 &&
               sizeof(ShaderFarCell) == 128);
 static_assert(sizeof(ShaderPlaced) == 384 && sizeof(ShaderFrame) == 20 * 16 + 30 * 8 + 22 * 4);
-static_assert(sizeof(ShaderLamp) == 13 * 16 && sizeof(ShaderTexturedFace) == 32);
+static_assert(sizeof(ShaderLamp) == 13 * 16 && sizeof(ShaderTexturedFace) == 48);
 static_assert(sizeof(ShaderPush) == 104 && sizeof(ShaderCounters) == 16);
+
+/// Returns a colour as `unpackUnorm4x8` in shaders reads it.
+[[nodiscard]] inline std::uint32_t packed_colour(Rgba8 colour) {
+  return colour.r | std::uint32_t{colour.g} << 8 | std::uint32_t{colour.b} << 16 | std::uint32_t{colour.a} << 24;
+}
 
 /// Packs -1 to 1 in 16 bits.
 [[nodiscard]] inline std::uint32_t signed_16(float value) {
