@@ -723,6 +723,11 @@ def check_shapes(quoin, folder):
         require(all(abs(normal[0]) > 0.9 for _, _, normal in seen["ring"]) and len(seen["ring"]) == 2, "the log lies")
         require(len(seen["bark"]) == 4 and len(seen["leaf"]) == 4, "bark and leaves")
         require(any(abs(abs(normal[0]) - 0.5 ** 0.5) < 1e-3 for _, _, normal in seen["leaf"]), "turned plates")
+        depths = [float((low + high) @ normal) for low, high, normal in seen["leaf"] if normal[0] * normal[1] > 0.0]
+        require(len(depths) == 2 and 0.001 < sum(depths) < 0.003, f"the sides of a plate lie in one plane: {depths}")
+        one_sided = [one.name for one in mesh.materials
+                     if any(node.type == "NEW_GEOMETRY" for node in one.node_tree.nodes)]
+        require(len(one_sided) == 1 and one_sided[0].startswith("leaf"), f"one-sided: {one_sided}")
         layer = mesh.uv_layers["Texture"].data
         for polygon in mesh.polygons:
             if mesh.materials[polygon.material_index].name.startswith("leaf"):

@@ -42,6 +42,7 @@ class _Looks:
         self.textures = scene.textures()
         self.forms = [kept.Form(self.textures.faces(i), self.textures.shapes(i), scene.orientations(i))
                       for i in range(len(types))]
+        self.is_shaped = np.array([one.shapes is not None for one in self.forms])
         self._faces = [_faces_of(one) for one in self.forms]  # of each type, by texture and tint
         self._rows, self._of_rows, self._of_faces, self._images = [], {}, {}, {}
         self.group = materials.occlusion_group(options.occlusion)
@@ -62,28 +63,30 @@ class _Looks:
             self._of[number] = materials.of_type(one, number, self.group, self.scale)
         return self._of[number]
 
-    def numbers_of(self, types, textures, tints):
+    def numbers_of(self, types, textures, tints, is_one_sided):
         """Returns numbers for `of`: the types, and other numbers for faces with a texture, or with a colour that is not
-        the type's."""
+        the type's. `is_one_sided`: of faces that are seen from their front only."""
         colours = np.array([one.rgba[:3] for one in self.types], np.uint8)
         is_own = (textures != _NO_TEXTURE) | (tints[:, :3] != colours[types]).any(1)
         found = types.copy()
         if is_own.any():
             kinds, kind = np.unique(textures[is_own], return_inverse=True)
             red, green, blue = tints[is_own, :3].astype(np.int64).T
-            packed = (types[is_own] * len(kinds) + kind) << 24 | red << 16 | green << 8 | blue
+            packed = (types[is_own] * len(kinds) + kind) << 25 | is_one_sided[is_own] << 24
+            packed |= red << 16 | green << 8 | blue
             packed, row = np.unique(packed, return_inverse=True)
             numbers = []
             for each in packed.tolist():
-                number, kind = divmod(each >> 24, len(kinds))
-                key = (number, int(kinds[kind]), (each >> 16 & 255, each >> 8 & 255, each & 255))
+                number, kind = divmod(each >> 25, len(kinds))
+                tint = (each >> 16 & 255, each >> 8 & 255, each & 255)
+                key = (number, int(kinds[kind]), tint, bool(each >> 24 & 1))
                 numbers.append(self._of_rows.setdefault(key, len(self.types) + len(self._rows)))
                 if numbers[-1] == len(self.types) + len(self._rows):
                     self._rows.append(key)
             found[is_own] = np.array(numbers)[row]
         return found
 
-    def _of_row(self, number, texture, tint):
+    def _of_row(self, number, texture, tint, is_one_sided):
         one = self.types[number]
         face = self._faces[number].get((texture, tint))
         if face is None:  # a colour
@@ -92,12 +95,14 @@ class _Looks:
                 coloured = one._replace(rgba=(*tint, one.rgba[3]))
                 self._of_faces[key] = materials.of_type(coloured, number, self.group, self.scale)
             return self._of_faces[key]
-        key = (face.texture, face.image.shape, face.tint, face.alpha, one.emission, one.metalness, one.roughness)
+        is_one_sided = is_one_sided and face.alpha != "opaque"
+        key = (face.texture, face.image.shape, face.tint, face.alpha, one.emission, one.metalness, one.roughness,
+               is_one_sided)
         if key not in self._of_faces:
             image = key[:3]
             if image not in self._images:
                 self._images[image] = materials.texture_image(face)
-            self._of_faces[key] = materials.of_face(one, face, self._images[image], self.group)
+            self._of_faces[key] = materials.of_face(one, face, self._images[image], self.group, is_one_sided)
         return self._of_faces[key]
 
     def has_own(self, number):
@@ -168,6 +173,35 @@ def _slots(mesh, looks, face_types, faces):
     return {int(number): int(slot_of[number]) for number in occurs if looks.has_own(int(number))}
 
 
+_GAP = 0.0005  # voxels
+_FACTORS = np.random.default_rng(7).integers(1, 2**62, 12) | 1
+
+
+def _twins(found, quads, is_shaped):
+    """Returns a flag per quad: true for the two sides of plates, which are in one plane. `is_shaped`: by type."""
+    flags = np.zeros(len(quads), np.int64)
+    numbers = np.flatnonzero(is_shaped[found.types[quads[:, 0]]])
+    corners = found.positions[quads[numbers]].astype(np.float64)
+    normals = np.abs(found.normals[quads[numbers, 0]].astype(np.float64))
+    place = np.concatenate([corners.min(1), corners.max(1), corners.mean(1), normals], axis=1)
+    # A number per plane and rectangle, wrapped to 64 bits.
+    keys = (np.rint(4096.0 * place).astype(np.int64) * _FACTORS).sum(1)
+    _, kinds, counts = np.unique(keys, return_inverse=True, return_counts=True)
+    flags[numbers] = counts[kinds] > 1
+    return flags
+
+
+def _apart(found, quads, twins):
+    """Returns the positions of a mesh with the two sides of plates moved apart, so that they do not shadow each
+    other."""
+    sides = quads[twins != 0]
+    if not len(sides):
+        return found.positions
+    positions = found.positions.copy()
+    positions[sides] += np.float32(_GAP) * found.normals[sides]
+    return positions
+
+
 def mesh_of(grid, name, looks, options):
     """Creates the Blender mesh of a grid, with attributes and materials. Returns it, or None if the grid has no
     surface; and the slots of types that have their own material."""
@@ -182,7 +216,8 @@ def mesh_of(grid, name, looks, options):
 
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(found.positions))
-    mesh.vertices.foreach_set("co", axes.points_to_blender(found.positions, options.scale).ravel())
+    twins = _twins(found, quads, looks.is_shaped) if blocks else np.zeros(0, np.int64)
+    mesh.vertices.foreach_set("co", axes.points_to_blender(_apart(found, quads, twins), options.scale).ravel())
     mesh.loops.add(len(corners))
     mesh.loops.foreach_set("vertex_index", corners)
     mesh.polygons.add(faces)
@@ -200,7 +235,7 @@ def mesh_of(grid, name, looks, options):
     face_types = np.zeros(0, np.int64) if blocks == 0 else found.types[:blocks:4].astype(np.int64)
     face_looks = face_types
     if found.textures is not None:
-        face_looks = looks.numbers_of(face_types, found.textures[:blocks:4], found.tints[:blocks:4])
+        face_looks = looks.numbers_of(face_types, found.textures[:blocks:4], found.tints[:blocks:4], twins)
     slots = _slots(mesh, looks, face_looks, faces)
     if found.textures is not None:
         layer = mesh.uv_layers.new(name=materials.TEXTURE, do_init=False)

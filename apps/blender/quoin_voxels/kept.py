@@ -180,8 +180,11 @@ class Kept:
         self.slots = about["slots"]  # material slot of each type; -1: none of its own
         self.types = [quoin.VoxelType(tuple(one[0]), *one[1:]) for one in about["types"]]
         self.forms = [Form()] * len(self.types)
-        if "forms" in about:
-            self.forms = _unpack_forms(about["forms"], about["images"], mesh[_TEXELS])
+        packed = about.get("forms")
+        if "faces" in about:  # stored before types had shapes
+            packed = [{} if six is None else {"faces": six} for six in about["faces"]]
+        if packed is not None:
+            self.forms = _unpack_forms(packed, about["images"], mesh[_TEXELS])
         self.states = None  # of the voxels; None: all 0
         if _STATES in mesh:
             self.states = np.frombuffer(zlib.decompress(mesh[_STATES]), np.uint32).reshape(about["shape"])

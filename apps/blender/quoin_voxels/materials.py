@@ -147,8 +147,9 @@ def texture_image(face):
     return image
 
 
-def of_face(one, face, image, group):
-    """Creates the material of textured faces of a type, with the image of `texture_image`."""
+def of_face(one, face, image, group, is_one_sided=False):
+    """Creates the material of textured faces of a type, with the image of `texture_image`. `is_one_sided`: the face is
+    invisible from behind, where another face of the same place shows its own texels."""
     material, shader, occlusion = _new(face.name or one.name or "texture", group)
     _set_surface(material, shader, one)
     tree = material.node_tree
@@ -173,6 +174,20 @@ def of_face(one, face, image, group):
             limit.location = (shader.location.x - 250, shader.location.y - 250)
             tree.links.new(alpha, limit.inputs[0])
             alpha = limit.outputs[0]
+        if is_one_sided:
+            geometry = tree.nodes.new("ShaderNodeNewGeometry")
+            geometry.location = (shader.location.x - 450, shader.location.y - 450)
+            front = tree.nodes.new("ShaderNodeMath")
+            front.operation = "SUBTRACT"
+            front.inputs[0].default_value = 1.0
+            front.location = (shader.location.x - 250, shader.location.y - 450)
+            tree.links.new(geometry.outputs["Backfacing"], front.inputs[1])
+            both = tree.nodes.new("ShaderNodeMath")
+            both.operation = "MULTIPLY"
+            both.location = (shader.location.x - 100, shader.location.y - 350)
+            tree.links.new(alpha, both.inputs[0])
+            tree.links.new(front.outputs[0], both.inputs[1])
+            alpha = both.outputs[0]
         tree.links.new(alpha, shader.inputs["Alpha"])
         if hasattr(material, "blend_method"):
             material.blend_method = "CLIP" if face.alpha == "cutout" else "BLEND"
