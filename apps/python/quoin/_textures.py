@@ -197,7 +197,7 @@ class Textures:
             (_c.ShapeCondition, whole.condition_count), (_c.Face, whole.look_count)))
         _c.check(_c.lib.quoin_textures_read_shapes(self._owner.handle, number, parts or None, elements or None,
                                                    conditions or None, looks or None))
-        seen = [_face_of(one, self._owner) if one.rgba else tuple(one.tint)[:3] for one in looks]
+        seen: List[Look] = [_face_of(one, self._owner) if one.rgba else tuple(one.tint)[:3] for one in looks]
         boxes, rules = iter([_element_of(one, seen) for one in elements]), iter(map(_condition_of, conditions))
         return Shapes(tuple(ShapePart(tuple(next(boxes) for _ in range(one.element_count)), one.orientation,
                                       tuple(next(rules) for _ in range(one.condition_count))) for one in parts),
