@@ -1,5 +1,5 @@
-// Meshes smooth terrain with coarser far chunks as one closed mesh with occlusion. Grass, earth, stone, sand and snow have
-// textures, which blend by the weights of vertices. Writes smooth_terrain.glb.
+// Meshes smooth terrain with coarser far chunks as one closed mesh with occlusion. Grass, earth, stone, sand and snow
+// have textures, which blend by the weights of vertices. Writes smooth_terrain.glb.
 
 #include <algorithm>
 #include <cstdint>

@@ -110,13 +110,13 @@ struct SmoothMeshOptions {
 [[nodiscard]] Result<float> simplify_smooth_mesh(SmoothMesh& mesh, float error_in_samples,
                                                  std::vector<std::uint32_t>& tags);
 
-/// Prepares the materials of a mesh for interpolation: afterwards the three vertices of each triangle have the same types
-/// in the same slots, some with weight 0. Vertices between triangles of different materials are duplicated, with equal
-/// positions, normals and weights. Call it after `simplify_smooth_mesh`. Does nothing to a mesh without materials.
+/// Prepares the materials of a mesh for interpolation: afterwards the three vertices of each triangle have the same
+/// types in the same slots, some with weight 0. Vertices between triangles of different materials are duplicated, with
+/// equal positions, normals and weights. Call it after `simplify_smooth_mesh`. A mesh without materials stays as it is.
 ///
-/// Many: where more than four materials meet in a triangle, it keeps the four with the greatest sums of weights (of equal
-///       ones the lowest types). The weights of the others go to the heaviest one of their vertex that is kept, or to
-///       the first one.
+/// Many: where more than four materials meet in a triangle, it keeps the four with the greatest sums of weights (of
+///       equal ones the lowest types). The weights of the others go to the heaviest one of their vertex that is kept,
+///       or to the first one.
 /// Cost: O(vertices + triangles).
 void align_materials(SmoothMesh& mesh);
 

@@ -30,8 +30,8 @@ class SurfaceMaterials {
   /// surface along its crossed edges, since corners may be far below the surface; if none of its edges is crossed, from
   /// the solid samples of the coarsest lattice within the cell that has any. A cell of air gives air, white.
   [[nodiscard]] CellMaterial of_cell(const DensityNeighbourhood& chunks, IVec3 first, int level) const;
-  /// As `of_cell`, for a vertex with this unit normal: textured materials have the colours of their textures there. Also
-  /// sets `materials` if it is not null.
+  /// As `of_cell`, for a vertex with this unit normal: textured materials have the colours of their textures there.
+  /// Also sets `materials` if it is not null.
   [[nodiscard]] CellMaterial of_vertex(const DensityNeighbourhood& chunks, IVec3 first, int level, const Vec3& normal,
                                        VertexMaterials* materials) const;
   /// Returns the colour of a type; white if it is not registered.

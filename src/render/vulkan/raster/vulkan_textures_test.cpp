@@ -84,7 +84,7 @@ class VulkanTextures : public vulkan_test::VulkanMeshTest {
   [[nodiscard]] std::size_t texel_count() const { return renderer_->impl().texels.size(); }
 };
 
-/// Hills of four materials that blend: two textures of other sizes and slopes, an emissive one, and one without textures.
+/// Hills of four materials that blend: textures of three sizes and slopes, one of them emissive, and one plain colour.
 DensityGrid add_hills(Scene& scene, float edge) {
   std::array<VoxelType, 4> types{};
   for (std::size_t i = 0; i < 3; ++i) {
