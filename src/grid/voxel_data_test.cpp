@@ -16,6 +16,7 @@
 #include <quoin/grid/grid.h>
 
 #include "core/death_for_tests.h"
+#include "grid/chunk/chunk_storage.h"
 
 namespace quoin {
 namespace {
@@ -423,6 +424,27 @@ TEST(VoxelDataDeathTest, AssertsOnTooManyBytes) {
   EXPECT_TRUE(grid.set_data({0, 0, 0}, {.bytes = most}));
   const std::vector<std::byte> more(kMaxVoxelDataBytes + 1);
   QUOIN_EXPECT_MISTAKE(grid.set_data({0, 0, 0}, {.bytes = more}), "no more bytes");
+}
+
+TEST(VoxelData, StatesOfARowAreThoseOfItsVoxels) {
+  std::mt19937 random(5);
+  Chunk chunk(kStone);
+  for (int i = 0; i < 400; ++i) {
+    const IVec3 at(random() % 64, random() % 6, random() % 6);
+    VoxelData data{.state = static_cast<std::uint32_t>(random() % 3)};
+    const std::vector<std::byte> bytes = bytes_of("a chest");
+    if (i % 5 == 0) data.bytes = bytes;
+    chunk.set_data(at, data);
+  }
+  for (int i = 0; i < 64; ++i) {
+    const RowStates row = RowStates::of(chunk, i % 8, i / 8);
+    std::size_t next = 0;
+    for (int x = 0; x < kChunkEdge; ++x) {
+      const std::uint32_t state = (row.voxels >> x & 1U) != 0 ? row.states[next++] : 0;
+      EXPECT_EQ(state, chunk.data({x, i % 8, i / 8}).state);
+    }
+  }
+  EXPECT_EQ(RowStates::of(Chunk(kStone), 0, 0).voxels, 0U);
 }
 
 }  // namespace

@@ -17,6 +17,14 @@ namespace quoin::packed_row {
 // A row is 64 voxels of `bits` bits each (1, 2, 4, 8 or 16), in `bits` words, lowest bits first. Everything here works
 // on whole words.
 
+/// Returns the number of set bits, as std::popcount, which is a call on processors without such an instruction.
+constexpr std::uint32_t count_bits(std::uint64_t w) {
+  w -= w >> 1 & 0x5555'5555'5555'5555U;
+  w = (w & 0x3333'3333'3333'3333U) + (w >> 2 & 0x3333'3333'3333'3333U);
+  w = (w + (w >> 4)) & 0x0F0F'0F0F'0F0F'0F0FU;
+  return static_cast<std::uint32_t>(w * 0x0101'0101'0101'0101U >> 56);
+}
+
 /// Returns every second bit of `w`, packed: bit i is bit 2i of `w`.
 constexpr std::uint64_t gather_even_bits(std::uint64_t w) {
   w &= 0x5555'5555'5555'5555U;

@@ -5,14 +5,15 @@
 #include <quoin/core/assert.h>
 
 #include "core/memory/make_room.h"
+#include "core/rows/packed_row.h"
 
 namespace quoin {
 
 std::size_t SlabData::rank(int row, int x) const {
   QUOIN_ASSERT(row >= 0 && row < kSlabRows && x >= 0 && x < kChunkEdge, "a voxel of the slab");
-  int before = std::popcount(stateful_[static_cast<std::size_t>(row)] & ((std::uint64_t{1} << x) - 1));
-  for (int i = 0; i < row; ++i) before += std::popcount(stateful_[static_cast<std::size_t>(i)]);
-  return static_cast<std::size_t>(before);
+  std::size_t before = packed_row::count_bits(stateful_[static_cast<std::size_t>(row)] & ((std::uint64_t{1} << x) - 1));
+  for (int i = 0; i < row; ++i) before += packed_row::count_bits(stateful_[static_cast<std::size_t>(i)]);
+  return before;
 }
 
 std::size_t SlabData::first_from(std::uint32_t place) const {
@@ -28,6 +29,12 @@ std::uint64_t SlabData::voxels(int row) const {
     found |= std::uint64_t{1} << (bytes_[i].place % kChunkEdge);
   }
   return found;
+}
+
+RowStates SlabData::states(int row) const {
+  QUOIN_ASSERT(row >= 0 && row < kSlabRows, "a row of the slab");
+  const std::uint64_t voxels = stateful_[static_cast<std::size_t>(row)];
+  return voxels == 0 ? RowStates{} : RowStates{voxels, states_.data() + rank(row, 0)};
 }
 
 VoxelData SlabData::get(int row, int x) const {
@@ -132,6 +139,12 @@ void ChunkData::clear(int y, int z, std::uint64_t mask) {
   count_ -= std::popcount(gone);
   QUOIN_ASSERT(count_ >= 0, "a count that is not negative");
   if (slab->empty()) slab.reset();
+}
+
+RowStates RowStates::of(const Chunk& chunk, int y, int z) {
+  const ChunkData* const data = ChunkData::of(chunk);
+  const SlabData* const slab = data == nullptr ? nullptr : data->slab(ChunkStorage::slab_index(y, z));
+  return slab == nullptr ? RowStates{} : slab->states(ChunkStorage::row_in_slab(y, z));
 }
 
 bool ChunkData::operator==(const ChunkData& other) const {

@@ -27,6 +27,7 @@ class SlabData : public RefCounted {
   /// Returns the voxels of a row that have a state, bytes, or either.
   [[nodiscard]] std::uint64_t voxels(int row) const;
   [[nodiscard]] VoxelData get(int row, int x) const;
+  [[nodiscard]] RowStates states(int row) const;
   /// Sets the data of a voxel. Requires: the data is not empty. If it throws, nothing has changed.
   void put(int row, int x, const VoxelData& data);
   /// Removes the data of the row's voxels in `mask`.

@@ -141,6 +141,16 @@ struct ChunkStorage : RefCounted {
   return mixed != nullptr ? mixed->non_air : chunk.non_air_count();
 }
 
+/// The states of a row of voxels that are not 0 (VoxelData::state): for a caller that reads many, faster than
+/// Chunk::data. Lifetime: until the chunk is written.
+struct RowStates {
+  std::uint64_t voxels = 0;               // bit x: that voxel has one
+  const std::uint32_t* states = nullptr;  // of these voxels, x ascending
+
+  /// Requires: 0 <= y, z < 64.
+  [[nodiscard]] static RowStates of(const Chunk& chunk, int y, int z);
+};
+
 // Returns storage that only this chunk uses, for writing.
 inline ChunkStorage& Chunk::own() {
   if (storage_.is_shared()) [[unlikely]]

@@ -14,6 +14,8 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/grid/voxel_shape.h>
 
+#include "core/rows/packed_row.h"
+
 namespace quoin {
 
 // A voxel with a shape.
@@ -121,15 +123,8 @@ class ShapeIndex {
       const auto number = static_cast<std::size_t>(local.y + kChunkEdge * local.z);
       const std::uint64_t row = touched[number];
       if ((row >> local.x & 1U) == 0) return {};
-      const std::size_t cell = first[number] + count_bits(row & ((std::uint64_t{1} << local.x) - 1));
+      const std::size_t cell = first[number] + packed_row::count_bits(row & ((std::uint64_t{1} << local.x) - 1));
       return std::span(shapes).subspan(starts[cell], starts[cell + 1] - starts[cell]);
-    }
-    // As std::popcount, which is a call on processors without such an instruction.
-    static std::uint32_t count_bits(std::uint64_t bits) {
-      bits -= bits >> 1 & 0x5555'5555'5555'5555U;
-      bits = (bits & 0x3333'3333'3333'3333U) + (bits >> 2 & 0x3333'3333'3333'3333U);
-      bits = (bits + (bits >> 4)) & 0x0F0F'0F0F'0F0F'0F0FU;
-      return static_cast<std::uint32_t>(bits * 0x0101'0101'0101'0101U >> 56);
     }
   };
 
