@@ -251,6 +251,19 @@ struct ModelBox {
   std::array<std::int16_t, 6> faces{-1, -1, -1, -1, -1, -1};
 };
 
+/// A face of a model as loops over many voxels read it: ModelFace::occluders, `on_side` and `is_inner`.
+struct alignas(16) PackedFace {
+  static constexpr std::uint8_t kAlwaysSeen = 6;
+  static constexpr std::uint8_t kNeverSeen = 7;
+
+  /// The number of the voxel, x + 3 y + 9 z, and the bit in ShapeModel::filled_octants of occluder 0 of each corner,
+  /// then of occluders 1 and 2. The bits are 0 for kNoOccluder. The last four entries are unused.
+  std::array<std::uint8_t, 16> voxels{};
+  std::array<std::uint8_t, 16> eighths{};
+  /// The Direction in which a neighbour can cover the face, kAlwaysSeen, or kNeverSeen for inner faces.
+  std::uint8_t side = kAlwaysSeen;
+};
+
 /// A shape ready for use: boxes and faces of one state and surrounding, turned. Immutable.
 struct ShapeModel {
   std::vector<ModelBox> boxes;
@@ -266,7 +279,10 @@ struct ShapeModel {
   IBox cells{IVec3{0}, IVec3{1}};  ///< voxels that boxes and faces touch, relative to the own one
   Vec3 min{0.0F};                  ///< bounds, in voxels
   Vec3 max{0.0F};
-  std::uint64_t hash = 0;  ///< of `faces` and `looks`, the same in every process
+  std::vector<PackedFace> packed_faces;  ///< as `faces`
+  std::uint8_t covered_sides = 0;        ///< `covers_side` as bits, by Direction
+  std::uint8_t touched_sides = 0;        ///< by Direction: boxes cover a part of the side, or all
+  std::uint64_t hash = 0;                ///< of `faces` and `looks`, the same in every process
 
   [[nodiscard]] bool empty() const { return faces.empty() && boxes.empty(); }
 };

@@ -190,6 +190,21 @@ std::uint64_t hash_of(const ShapeModel& model) {
   return hash;
 }
 
+PackedFace packed(const ModelFace& face) {
+  PackedFace made;
+  for (std::size_t corner = 0; corner < 4; ++corner) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::uint8_t number = face.occluders[corner][i];
+      if (number == kNoOccluder) continue;
+      made.voxels[4 * i + corner] = number >> 3U;
+      made.eighths[4 * i + corner] = static_cast<std::uint8_t>(1U << (number & 7U));
+    }
+  }
+  if (face.on_side) made.side = static_cast<std::uint8_t>(face.direction);
+  if (face.is_inner) made.side = PackedFace::kNeverSeen;
+  return made;
+}
+
 class ModelBuilder {
  public:
   void add(const ShapeElement& element, const AxisOrientation& orientation) {
@@ -296,8 +311,11 @@ class ModelBuilder {
     for (std::size_t i = 0; i < 6; ++i) {
       m.covers_side[i] = std::all_of(m.sides[i].begin(), m.sides[i].end(),
                                      [](std::uint64_t word) { return word == ~std::uint64_t{0}; });
+      m.covered_sides |= static_cast<std::uint8_t>(unsigned{m.covers_side[i]} << i);
+      m.touched_sides |= static_cast<std::uint8_t>(unsigned{m.sides[i] != SideMask{}} << i);
     }
     m.hash = hash_of(m);
+    for (const ModelFace& face : m.faces) m.packed_faces.push_back(packed(face));
     if (is_bounded_) {
       for (int axis = 0; axis < 3; ++axis) {
         m.cells.min[axis] = std::min(0, static_cast<int>(std::floor(m.min[axis])));

@@ -68,6 +68,33 @@ TEST(VoxelShape, TurnsKeepFacesOutwardAndBoxesEqual) {
   }
 }
 
+TEST(VoxelShape, PackedFacesHaveTheSameContent) {
+  const std::array<VoxelShapes, 3> all = {VoxelShapes(slab()), VoxelShapes(VoxelShape::crossed_plates()), stairs()};
+  for (const VoxelShapes& shapes : all) {
+    for (int i = 0; i < AxisOrientation::kCount; ++i) {
+      const ShapeModel& model = model_of(shapes, AxisOrientation::at(i));
+      ASSERT_EQ(model.packed_faces.size(), model.faces.size());
+      for (std::size_t f = 0; f < model.faces.size(); ++f) {
+        const ModelFace& face = model.faces[f];
+        const PackedFace& packed = model.packed_faces[f];
+        for (std::size_t k = 0; k < 12; ++k) {
+          const std::uint8_t number = face.occluders[k % 4][k / 4];
+          EXPECT_EQ(packed.eighths[k], number == kNoOccluder ? 0 : 1 << (number & 7));
+          if (number != kNoOccluder) {
+            EXPECT_EQ(packed.voxels[k], number / 8);
+          }
+        }
+        const auto side = face.on_side ? static_cast<std::uint8_t>(face.direction) : PackedFace::kAlwaysSeen;
+        EXPECT_EQ(packed.side, face.is_inner ? PackedFace::kNeverSeen : side);
+      }
+      for (std::size_t side = 0; side < 6; ++side) {
+        EXPECT_EQ((model.covered_sides >> side & 1) != 0, model.covers_side[side]);
+        EXPECT_EQ((model.touched_sides >> side & 1) != 0, model.sides[side] != SideMask{});
+      }
+    }
+  }
+}
+
 TEST(VoxelShape, CrossedPlatesHaveFourFacesAndNoBits) {
   const VoxelShapes shapes(VoxelShape::crossed_plates());
   const ShapeModel& model = model_of(shapes);

@@ -257,8 +257,8 @@ TEST(PathTextures, ShowsTexelsWithinGlassOfAnotherGrid) {
   EXPECT_GT(difference(opaque, image_of(FaceAlpha::Cutout, 0)), 0.01);
 }
 
-// A dark ceiling with one lamp, whose texture lights one half, and a lamp of half the size. The lamp's state may turn it
-// by a half turn about y, after the first image.
+// A dark ceiling with one lamp, whose texture lights one half, and a lamp of half the size. The lamp's state may turn
+// it by a half turn about y, after the first image.
 TEST(PathTextures, SamplesLightOfTexels) {
   for (const bool is_turned : {false, true}) {
     const auto image_of = [is_turned](bool has_texture) {

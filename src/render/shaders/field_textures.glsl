@@ -1,4 +1,3 @@
-// The textures of materials on fields; matches TriplanarRule and triplanar_colour (scene/surfaces.h) on the CPU. The
 // The textures of materials on fields; matches TriplanarRule and triplanar_colour (scene/surfaces.h) on the CPU. A
 // type's six textured faces hold its rule in `on_fields`: `steep_y`, `flat_y`, the textures per voxel, and the fraction
 // of this number in units of 2^-32 and 2^-64.

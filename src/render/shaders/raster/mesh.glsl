@@ -62,10 +62,10 @@ layout(push_constant) uniform Push {
   uvec2 far_faces;  // of an impostor; or the faces of the chunk's shapes
   float room;       // of the instance; the sky's: converts the distance from the image's centre to the tangent of an
                     // angle
-  uint numbers;     // bits 0-3: draw mode; from 4 on for a smooth mesh: its vertices if it has materials, else 0; for an
-                    // impostor 4-27: share of pixels that use the coarser level, 28: 1 if this is that level, 29: 1 if
-                    // it has cells; for shapes and cutouts 30: 1 if their types are transparent, 31: 1 if only their
-                    // faces that hide the background are drawn
+  uint numbers;     // bits 0-3: draw mode; from 4 on for a smooth mesh: its vertices if it has materials, else 0; for
+                    // an impostor 4-27: share of pixels that use the coarser level, 28: 1 if this is that level, 29: 1
+                    // if it has cells; for shapes and cutouts 30: 1 if their types are transparent, 31: 1 if only
+                    // their faces that hide the background are drawn
 } push;
 
 MeshFrame mesh_frame() {
