@@ -7,6 +7,7 @@
 // row and from row to row takes a few word operations (an addition carries "every cell agrees" to a run's end). The
 // rest of the work is one flat loop over the quads, without unpredictable branches.
 
+#include <array>
 #include <tuple>
 #include <utility>
 
@@ -23,6 +24,17 @@
 namespace quoin::blocky {
 namespace {
 
+// Removes the faces that ShapedVoxels::keys lists from a batch. Requires: batches are in the mesher's order.
+void leave_out_faces(ShapedVoxels& shapes, int direction, int first_plane, int plane_count, Batch& b) {
+  const std::uint32_t* const keys = shapes.keys.data();
+  const std::uint32_t first = static_cast<std::uint32_t>(direction << 6 | first_plane) << 13;
+  const std::uint32_t end = first + (static_cast<std::uint32_t>(plane_count) << 13);
+  for (; shapes.next_key < shapes.keys.size() && keys[shapes.next_key] < end; ++shapes.next_key) {
+    const std::uint32_t key = (keys[shapes.next_key] - first) >> 1;
+    b.faces[(key >> 12) * kRowStride + (key >> 6 & 63)] &= ~(std::uint64_t{1} << (key & 63));
+  }
+}
+
 template <int kDirection, bool kOcclusion>
 void run_pass(const Job& job, const Pass& pass, const TypeSource& types, Scratch& s, QuadBuffer& quads) {
   Batch& b = s.batch;
@@ -30,6 +42,7 @@ void run_pass(const Job& job, const Pass& pass, const TypeSource& types, Scratch
     const int count = pass.planes.end - first < kBatchPlanes ? pass.planes.end - first : kBatchPlanes;
     const int groups =
         job.has_transparent ? find_faces<true>(pass, first, count, b) : find_faces<false>(pass, first, count, b);
+    if (job.shapes != nullptr) leave_out_faces(*job.shapes, kDirection, first, count, b);
     if (groups == 0) continue;
     if (!job.merge) {
       keep_apart(groups, b);
@@ -90,6 +103,7 @@ void run_direction(const Job& job, bool row_ends, const TypeSource& types, Scrat
   } else {
     run_pass<kDirection, false>(job, pass, types, s, out);
   }
+  if (job.shapes != nullptr) append_quads_next_to_shapes(job, static_cast<Direction>(kDirection), s, out);
 }
 
 // Returns true if all voxels of a chunk except air have one type, and sets `type`.
@@ -177,18 +191,47 @@ void find_shapes_around(const Job& whole, Scratch& s) {
   Job job = whole;
   job.by = LayerClass::Shape;
   ShapedVoxels& shapes = *job.shapes;
-  if (shapes.is_in_centre && shapes.has_transparent_cubes) fill_layers(job, slabs_around(job.region), s);
-  const bool has_ends = gather_border(job, s);
-  shapes.rows = s.z.opaque;
-  if (has_ends) {
-    shapes.ends = s.z.ends;
-  } else {
-    __builtin_memset(shapes.ends.words, 0, sizeof(shapes.ends.words));
+  if (shapes.is_in_centre && shapes.has_transparent_cubes) {
+    fill_layers(job, slabs_around(job.region), s);
+    shapes.rows = s.z.opaque;
+  }
+  const bool has_ends = gather_border(job, shapes.rows, shapes.ends);
+  if (!has_ends) __builtin_memset(shapes.ends.words, 0, sizeof(shapes.ends.words));
+}
+
+// Lists the rows with shaped voxels in and around the region, and clears the others' bits.
+void list_rows_of_shapes(const Job& job, ShapedVoxels& shapes) {
+  const IBox around{job.region.min - 1, job.region.max + 1};
+  const int first = around.min.x > 0 ? around.min.x : 0;
+  const int last = (around.max.x < kChunkEdge ? around.max.x : kChunkEdge) - 1;
+  const std::uint64_t cells = (~std::uint64_t{0} << first) & (~std::uint64_t{0} >> (kChunkEdge - 1 - last));
+  const std::uint64_t ends = std::uint64_t{around.min.x < 0} << 63 | std::uint64_t{around.max.x > kChunkEdge};
+  shapes.listed_count = 0;
+  const auto add = [&](int y, int z) {
+    const int at = word_index(z, y);
+    const std::uint64_t row = shapes.rows.words[at] &= cells;
+    const std::uint64_t beyond = shapes.ends.words[at] &= ends;
+    shapes.listed[shapes.listed_count] = ShapedVoxels::listed_row(y, z);
+    shapes.listed_count += (row | beyond) != 0 ? 1 : 0;
+  };
+  for (int z = around.min.z; z < around.max.z; ++z) {
+    for (int y = around.min.y; y < around.max.y;) {
+      const int at = word_index(z, y);
+      if (y >= 0 && y % kLanes == 0 && y + kLanes <= around.max.y && y < kChunkEdge) {
+        const Words found = (load(shapes.rows.words + at) & cells) | (load(shapes.ends.words + at) & ends);
+        if (!any(found)) {
+          y += kLanes;
+          continue;
+        }
+      }
+      do add(y++, z);
+      while (y < around.max.y && y % kLanes != 0);
+    }
   }
 }
 
 // Lists all shaped voxels of the region and around it. Requires: the layers of the chunk are filled.
-void list_all_shapes(const Job& job, Scratch& s) {
+void list_all_shapes(const Job& job, bool row_ends, Scratch& s) {
   ShapedVoxels& shapes = *job.shapes;
   if (!shapes.is_in_centre || !shapes.has_transparent_cubes) {
     const Words mask = Words{} - std::uint64_t{shapes.is_in_centre};
@@ -200,7 +243,8 @@ void list_all_shapes(const Job& job, Scratch& s) {
       }
     }
   }
-  list_shapes(job);
+  list_rows_of_shapes(job, shapes);
+  list_shapes(job, row_ends, s);
 }
 
 // Finds the visible faces of cubes: shaped voxels have none in these layers, and hide those that they cover.
@@ -220,9 +264,11 @@ void find_all_faces(const Job& job, Scratch& s) {
   const SlabRange range = slabs_around(job.region);
   fill_layers(job, range, s);
   end_at_border(range, s);
-  if (job.shapes != nullptr) list_all_shapes(job, s);
-  const bool row_ends = gather_border(job, s);
-  if (job.shapes != nullptr) return find_faces_of_cubes(job, row_ends, s);
+  const bool row_ends = gather_border(job, s.z.opaque, s.z.ends);
+  if (job.shapes != nullptr) {
+    list_all_shapes(job, row_ends, s);
+    return find_faces_of_cubes(job, row_ends, s);
+  }
   find_faces_of_all_types(job, row_ends, s);
 }
 
@@ -263,7 +309,14 @@ void turn_views(const Job& job, bool row_ends, Scratch& s) {
 
 // Finds the faces, then fills the layers of opaque voxels again with only those that occlude: the passes over
 // directions use them only for occlusion if the faces are given. Returns the job with these layers, and `row_ends`.
+// Cubes that are all opaque and occlude need no layers of faces, even with shapes.
 std::pair<Job, bool> find_faces_first(Job job, bool row_ends, Scratch& s) {
+  if (job.shapes != nullptr) find_covered_sides(job, row_ends, s);
+  if (job.shapes != nullptr && !job.has_unoccluding && !job.shapes->has_transparent_cubes) {
+    job.has_transparent = false;
+    take_faces_next_to_shapes(job, row_ends, s);
+    return {job, row_ends};
+  }
   if (job.shapes != nullptr) {
     find_faces_of_cubes(job, row_ends, s);
   } else {
@@ -275,7 +328,7 @@ std::pair<Job, bool> find_faces_first(Job job, bool row_ends, Scratch& s) {
     const SlabRange range = slabs_around(job.region);
     fill_layers(job, range, s);
     end_at_border(range, s);
-    row_ends = gather_border(job, s);
+    row_ends = gather_border(job, s.z.opaque, s.z.ends);
   }
   if (job.shapes != nullptr) take_faces_next_to_shapes(job, row_ends, s);
   return {job, row_ends};
@@ -289,8 +342,8 @@ void mesh_chunk(const Job& whole, Scratch& s, QuadBuffer& out) {
   const SlabRange range = slabs_around(job.region);
   fill_layers(job, range, s);
   if (!job.one_type) end_at_border(range, s);
-  if (job.shapes != nullptr) list_all_shapes(job, s);
-  bool row_ends = gather_border(job, s);
+  bool row_ends = gather_border(job, s.z.opaque, s.z.ends);
+  if (job.shapes != nullptr) list_all_shapes(job, row_ends, s);
   job.region = above_solid_floor(job, row_ends, s);
   if (job.region.empty()) return;
   if (job.has_unoccluding || job.shapes != nullptr) std::tie(job, row_ends) = find_faces_first(job, row_ends, s);
@@ -299,9 +352,158 @@ void mesh_chunk(const Job& whole, Scratch& s, QuadBuffer& out) {
   run_directions(job, row_ends, types, s, out);
 }
 
+// Writes 64 bytes: `value` for the set bits of a row, else 0.
+QUOIN_INLINE void expand_row(std::uint64_t row, std::uint8_t value, std::uint8_t* out) {
+#ifdef QUOIN_KERNEL_AVX512
+  _mm512_storeu_si512(out, _mm512_maskz_set1_epi8(row, static_cast<char>(value)));
+#elif defined(QUOIN_KERNEL_AVX2)
+  const __m256i bytes = _mm256_set_epi64x(0x0303'0303'0303'0303, 0x0202'0202'0202'0202, 0x0101'0101'0101'0101, 0);
+  const __m256i bits = _mm256_set1_epi64x(static_cast<long long>(0x8040'2010'0804'0201U));
+  for (int half = 0; half < 2; ++half) {
+    const __m256i word = _mm256_set1_epi32(static_cast<int>(row >> (32 * half)));
+    const __m256i set = _mm256_cmpeq_epi8(_mm256_and_si256(_mm256_shuffle_epi8(word, bytes), bits), bits);
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(out) + half,
+                        _mm256_and_si256(set, _mm256_set1_epi8(static_cast<char>(value))));
+  }
+#else
+  for (int i = 0; i < 8; ++i) {
+    // Copies the byte to eight, and keeps bit k in byte k.
+    const std::uint64_t eight = (row >> 8 * i & 0xFF) * 0x0101'0101'0101'0101U & 0x8040'2010'0804'0201U;
+    const std::uint64_t set = (eight + 0x7F7F'7F7F'7F7F'7F7FU) >> 7 & 0x0101'0101'0101'0101U;
+    const std::uint64_t cells = set * value;
+    __builtin_memcpy(out + 8 * i, &cells, 8);
+  }
+#endif
+}
+
+void fill_cells(const std::uint16_t* listed, std::size_t count, const Layer& rows, const Layer* ends,
+                std::uint8_t value, std::uint8_t* cells) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const int y = (listed[i] & 127) - 1;
+    const int z = (listed[i] >> 7) - 1;
+    const int at = word_index(z, y);
+    std::uint8_t* const out = cells + ShapedVoxels::cell_at({0, y, z});
+    expand_row(rows.words[at], value, out);
+    const std::uint64_t beyond = ends == nullptr ? 0 : ends->words[at];
+    out[-1] = (beyond >> 63) != 0 ? value : 0;
+    out[kChunkEdge] = (beyond & 1) != 0 ? value : 0;
+  }
+}
+
+// By four bits per kind of neighbour, bit i for corner i: eight bits of occlusion. Bits 0 to 3: the first sides, 4 to
+// 7: the second ones, 8 to 11: the diagonals.
+constexpr std::array<std::uint8_t, 4096> kOcclusionOfNeighbours = [] {
+  std::array<std::uint8_t, 4096> made{};
+  for (unsigned bits = 0; bits < made.size(); ++bits) {
+    for (unsigned i = 0; i < 4; ++i) {
+      const unsigned a = bits >> i & 1;
+      const unsigned b = bits >> (4 + i) & 1;
+      const unsigned c = bits >> (8 + i) & 1;
+      made[bits] = static_cast<std::uint8_t>(made[bits] | (a + b + (c | (a & b))) << 2 * i);
+    }
+  }
+  return made;
+}();
+
+// Copies the bytes of a voxel and its 26 neighbours, x first, then y, then z.
+QUOIN_INLINE void gather_around(const std::uint8_t* cell, std::uint8_t* around) {
+  constexpr int kPlane = ShapedVoxels::kEdge * ShapedVoxels::kCellStride;
+  for (int row = 0; row < 9; ++row) {
+    // Writes one byte more, which the next row replaces.
+    __builtin_memcpy(around + 3 * row, cell + (row / 3 - 1) * kPlane + (row % 3 - 1) * ShapedVoxels::kCellStride - 1,
+                     4);
+  }
+}
+
+// Returns the eight bits of occlusion of a face from the bytes around its voxel.
+QUOIN_INLINE unsigned occlusion_of(const PackedFace& face, const std::uint8_t* around) {
+  unsigned filled = 0;
+#ifdef QUOIN_KERNEL_AVX2
+  const auto* const words = reinterpret_cast<const __m128i*>(around);
+  const __m128i voxels = _mm_load_si128(reinterpret_cast<const __m128i*>(face.voxels.data()));
+  const __m128i bits = _mm_load_si128(reinterpret_cast<const __m128i*>(face.eighths.data()));
+  // A shuffle gives 0 for numbers with bit 7: those above 15 in the lower half, those below 16 in the upper one.
+  const __m128i lower = _mm_shuffle_epi8(_mm_load_si128(words), _mm_adds_epu8(voxels, _mm_set1_epi8(0x70)));
+  const __m128i upper = _mm_shuffle_epi8(_mm_load_si128(words + 1), _mm_sub_epi8(voxels, _mm_set1_epi8(16)));
+  const __m128i open = _mm_cmpeq_epi8(_mm_and_si128(_mm_or_si128(lower, upper), bits), _mm_setzero_si128());
+  filled = ~static_cast<unsigned>(_mm_movemask_epi8(open)) & 0xFFF;
+#else
+  for (unsigned k = 0; k < 12; ++k) {
+    const unsigned byte = around[face.voxels[k]] & face.eighths[k];
+    filled |= (byte != 0 ? 1U : 0U) << k;
+  }
+#endif
+  return kOcclusionOfNeighbours[filled];
+}
+
+void find_occlusion(const std::uint8_t* eighths, const CornerQuery* queries, std::size_t count, std::uint8_t* answers) {
+  alignas(32) std::uint8_t around[32] = {};
+  std::uint32_t last = ~std::uint32_t{0};
+  for (std::size_t i = 0; i < count; ++i) {
+    const CornerQuery query = queries[i];
+    if (query.cell != last) gather_around(eighths + query.cell, around);
+    last = query.cell;
+    answers[i] = static_cast<std::uint8_t>(occlusion_of(*query.face, around));
+  }
+}
+
+QUOIN_INLINE bool covers_all(const SideMask& squares, const SideMask& mask) {
+  std::uint64_t open = 0;
+  for (std::size_t i = 0; i < 4; ++i) open |= mask[i] & ~squares[i];
+  return open == 0;
+}
+
+// Writes the visible faces of a shaped voxel.
+template <bool kOcclusion>
+QUOIN_INLINE ShapeFace* write_faces(const Job& job, const ShapedVoxel& voxel, ShapeFace* out) {
+  constexpr int kPlane = ShapedVoxels::kEdge * ShapedVoxels::kCellStride;
+  constexpr int kSteps[6] = {1, -1, ShapedVoxels::kCellStride, -ShapedVoxels::kCellStride, kPlane, -kPlane};
+  const std::size_t cell = ShapedVoxels::cell_at(voxel.local);
+  const std::uint8_t* const sides = job.shapes->sides.data() + cell;
+  unsigned hidden = 1U << PackedFace::kNeverSeen;
+  unsigned asked = 0;
+  for (unsigned d = 0; d < 6; ++d) {
+    const unsigned side = sides[kSteps[d]];
+    hidden |= (side >> (d ^ 1U) & 1U) << d;
+    asked |= side / ShapedVoxels::kPartly << d;
+  }
+  const SideMask* masks[6] = {};
+  if ((asked &= ~hidden) != 0) asked = find_covered_squares(job, voxel, asked, masks);
+  alignas(32) std::uint8_t around[32] = {};
+  if constexpr (kOcclusion) gather_around(job.shapes->eighths.data() + cell, around);
+  const ShapeModel& model = *voxel.model;
+  const auto place = static_cast<std::uint32_t>(voxel.local.x | voxel.local.y << 6 | voxel.local.z << 12);
+  const PackedFace* const faces = model.packed_faces.data();
+  const std::size_t count = model.packed_faces.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const PackedFace& face = faces[i];
+    std::uint32_t bits = place;
+    if constexpr (kOcclusion) bits |= occlusion_of(face, around) << ShapeFace::kOcclusionShift;
+    out->model = &model;
+    out->bits = bits;
+    out->face = static_cast<std::uint16_t>(i);
+    out->type = voxel.type;
+    bool is_seen = (hidden >> face.side & 1U) == 0;
+    if ((asked >> face.side & 1U) != 0) is_seen = !covers_all(*masks[face.side], model.faces[i].mask);
+    out += is_seen ? 1 : 0;
+  }
+  return out;
+}
+
+ShapeFace* write_shape_faces(const Job& job, ShapeFace* out) {
+  const ShapedVoxel* voxel = job.shapes->voxels.data();
+  const ShapedVoxel* const end = voxel + job.shapes->voxels.size();
+  for (; voxel != end; ++voxel) {
+    if (!job.region.contains(voxel->local)) continue;
+    out = job.occlusion ? write_faces<true>(job, *voxel, out) : write_faces<false>(job, *voxel, out);
+  }
+  return out;
+}
+
 }  // namespace
 
-constinit const Kernel QUOIN_KERNEL(Kernel) = {&mesh_chunk, &find_all_faces, &count_all_faces};
+constinit const Kernel QUOIN_KERNEL(Kernel) = {&mesh_chunk, &find_all_faces,    &count_all_faces,
+                                               &fill_cells, &write_shape_faces, &find_occlusion};
 
 #ifndef QUOIN_KERNEL_AVX2
 constinit const KernelTable<Kernel> kKernels = QUOIN_KERNEL_TABLE(Kernel, Avx2);

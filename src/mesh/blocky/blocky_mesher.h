@@ -99,9 +99,14 @@ struct OcclusionTables {
 struct ShapedVoxel {
   IVec3 local{0};  // -1 to 64
   VoxelType type = kAir;
-  bool is_opaque = false;    // its material: it hides and darkens faces
-  std::uint8_t covered = 0;  // if opaque: the sides that it covers wholly, by direction
+  bool is_opaque = false;  // its material: it hides and darkens faces
   const ShapeModel* model = nullptr;
+};
+
+// A question: the occlusion of a face of a voxel.
+struct CornerQuery {
+  const PackedFace* face;
+  std::uint32_t cell;  // of the voxel, in ShapedVoxels::eighths
 };
 
 // The shaped voxels of a region and of the voxels around it.
@@ -110,24 +115,59 @@ struct ShapedVoxels {
   static constexpr int kCellStride = kChunkEdge + 16;
   static constexpr std::size_t kRows = std::size_t{kEdge} * kEdge;
 
-  // An entry of `cells`: the eighths of the voxel that darken corners (ShapeModel::filled_octants), the sides that it
-  // covers wholly, by direction, and a bit for voxels with shapes.
-  using Cell = std::uint16_t;
-  static constexpr unsigned kCoveredShift = 8;
-  static constexpr Cell kShaped = 1U << 14;
-  static constexpr Cell kCube = 0x3FFF;  // an occluder
+  static constexpr std::uint8_t kWhole = 0x3F;     // an entry of `sides`: a voxel that covers all sides
+  static constexpr std::uint8_t kPartly = 1 << 6;  // also set for shapes that cover parts of sides: ask them
 
   bool is_in_centre = false;           // the centre has some
   bool has_transparent_cubes = false;  // the centre has some
   Layer rows;                          // shaped voxels, in the z view's layout
   Layer ends;                          // as View::ends
-  std::uint32_t first[kRows];          // by row_of: the number of voxels before the row
-  BlockVector<ShapedVoxel> voxels;     // by z, y, x
-  BlockVector<Cell> cells;             // by cell_at; valid within two voxels of shaped ones
+  std::uint16_t listed[kRows];         // rows with shaped voxels, by z, y: 128 (z + 1) + y + 1
+  std::size_t listed_count = 0;
+  std::uint32_t first[kRows];       // by row_of, of listed rows: the number of voxels before the row
+  BlockVector<ShapedVoxel> voxels;  // by z, y, x
+  // By cell_at, valid within two voxels of shaped ones: the eighths of a voxel that darken corners
+  // (ShapeModel::filled_octants), and the sides that it covers wholly, by direction.
+  BlockVector<std::uint8_t> eighths;
+  BlockVector<std::uint8_t> sides;
+  BlockVector<std::uint16_t> near_rows;  // the rows of these cells, as in `listed`
   bool has_cells = false;
   QuadBuffer quads;  // of cubes next to shapes, which the kernel leaves out
 
+  // The models of this job so far, in slots that their keys select.
+  struct KnownModel {
+    std::uint64_t job = 0;
+    std::uint64_t key = 0;  // type, state and neighbours
+    const ShapeModel* model = nullptr;
+  };
+  struct KnownType {
+    std::uint64_t job = 0;
+    VoxelType type = kAir;
+    bool is_opaque = false;
+    bool has_state = false;
+    bool is_turned = false;
+    const ShapeRules* rules = nullptr;
+    const ShapeModel* only_model = nullptr;  // if neither state nor neighbours matter
+  };
+  std::array<KnownModel, 256> known_models{};
+  std::array<KnownType, 64> known_types{};
+  std::uint64_t job = 0;  // number of the present one
+  // Temporary lists: shapes that follow their neighbours, keys of faces, and questions with their answers.
+  struct Pending {
+    std::uint32_t voxel;  // index of `voxels`
+    std::uint32_t state;
+  };
+  BlockVector<Pending> pending;
+  // The faces that passes over directions leave out, in their order: 2 (4096 plane + 64 row + bit), from 2^19 on by
+  // direction; plus 1 if a shape covers the face.
+  BlockVector<std::uint32_t> keys;
+  BlockVector<std::uint32_t> other_keys;
+  std::size_t next_key = 0;  // index of the next one of the present pass
+  BlockVector<CornerQuery> queries;
+  BlockVector<std::uint8_t> answers;
+
   static std::size_t row_of(int y, int z) { return static_cast<std::size_t>((z + 1) * kEdge + y + 1); }
+  static std::uint16_t listed_row(int y, int z) { return static_cast<std::uint16_t>((z + 1) << 7 | (y + 1)); }
   static std::size_t cell_at(const IVec3& local) {
     return row_of(local.y, local.z) * kCellStride + static_cast<std::size_t>(local.x + 8);
   }
@@ -162,6 +202,8 @@ enum class LayerClass : std::uint8_t {
   Shape,      // opaque: types with shapes; transparent: all others
 };
 
+struct Kernel;
+
 // The input of a kernel.
 struct Job {
   const Neighbourhood* chunks;
@@ -174,6 +216,7 @@ struct Job {
   // Some opaque voxel of the 27 chunks does not occlude, and occlusion is wanted. Set only with `has_transparent`.
   bool has_unoccluding = false;
   ShapedVoxels* shapes = nullptr;  // not null: some voxel of the 27 chunks has a shape. Then `has_transparent`, too.
+  const Kernel* kernel = nullptr;  // not null if there are shapes
   LayerClass by = LayerClass::Sight;
   bool has_faces = false;  // the visible faces are found: the layers of opaque voxels serve occlusion alone
 
@@ -195,6 +238,15 @@ struct Kernel {
   void (*find_faces)(const Job& job, Scratch& scratch);
   // Counts the visible faces of the region instead.
   std::int64_t (*count_faces)(const Job& job, Scratch& scratch);
+  // Fills rows of cells, listed as in ShapedVoxels::listed, and the cells before and after them: `value` for the set
+  // bits of `rows`, else 0. `ends`: null if the layer is not valid.
+  void (*fill_cells)(const std::uint16_t* listed, std::size_t count, const Layer& rows, const Layer* ends,
+                     std::uint8_t value, std::uint8_t* cells);
+  // Writes the visible faces of the shapes of the job's region. Returns the end of those written.
+  ShapeFace* (*write_shape_faces)(const Job& job, ShapeFace* out);
+  // Answers queries: eight bits of occlusion per face, as in a quad.
+  void (*find_occlusion)(const std::uint8_t* eighths, const CornerQuery* queries, std::size_t count,
+                         std::uint8_t* answers);
 };
 
 // The wider kernels exist only in builds that compile them. `kKernels` contains the available ones.
@@ -212,11 +264,21 @@ bool holds_transparent(const Chunk& chunk, const VoxelRegistry& types);
 // Returns true if an opaque voxel of the chunks may not occlude.
 bool hold_unoccluding(const Neighbourhood& chunks, const VoxelRegistry& types);
 
+// Returns the layer of faces in a direction, if some types are transparent.
+inline Layer& faces_towards(Direction direction, Scratch& s) {
+  const auto d = static_cast<std::size_t>(direction);
+  return d < 4 ? s.sides[d] : s.z.faces[d - 4];
+}
+
 // Removes, from `sides` and the z view's faces, the faces of transparent voxels that a voxel of the same type beyond
 // the chunk's border hides.
 void hide_faces_at_border(const Job& job, Scratch& scratch);
 
-// Appends the visible faces of the region's shapes. Requires: a kernel meshed the job.
+// Finds the squares that shaped neighbours cover of some sides of a shaped voxel: sets `masks`, by direction. Returns the
+// sides with such squares. Both sets of sides are bits.
+unsigned find_covered_squares(const Job& job, const ShapedVoxel& voxel, unsigned sides, const SideMask** masks);
+
+// Replaces `out` with the visible faces of the region's shapes. Requires: a kernel meshed the job.
 void append_shape_faces(const Job& job, ShapeFaceBuffer& out);
 
 // The orientations of types that their state turns, in quads.
@@ -239,15 +301,29 @@ class TurnedTypes {
   QuadBuffer made_;
 };
 
-// Lists the shaped voxels in and around the region from `shapes->rows` and `shapes->ends`.
-void list_shapes(const Job& job);
+// Lists the shaped voxels in and around the region, with their models, from `rows`, `ends` and `listed`. Requires: the
+// z view's opaque voxels are valid, with those around the chunk. `row_ends`: its ends are valid.
+void list_shapes(const Job& job, bool row_ends, Scratch& scratch);
 
 // Removes, from the layers of faces, the faces of cubes that shapes cover.
 void hide_faces_behind_shapes(const Job& job, Scratch& scratch);
 
-// Moves the faces of cubes whose corners shapes may darken from the layers of faces to `shapes->quads`, in the mesher's
-// order. Requires: the z view's opaque voxels are the occluders. `row_ends`: its ends are valid.
+// Fills `shapes->sides`. Requires: as list_shapes, and the shapes are listed.
+void find_covered_sides(const Job& job, bool row_ends, Scratch& scratch);
+
+// Lists the faces of cubes that the passes over directions leave out: if `job.has_faces` is false, those that shapes
+// cover; and those whose corners shapes may darken, which become `shapes->quads`, in the mesher's order. Requires: the z
+// view's opaque voxels are the occluders, and `shapes->sides` is filled. `row_ends`: its ends are valid.
 void take_faces_next_to_shapes(const Job& job, bool row_ends, Scratch& scratch);
+
+// Appends the quads of `shapes->quads` in a direction.
+void append_quads_next_to_shapes(const Job& job, Direction direction, Scratch& scratch, QuadBuffer& out);
+
+// Returns a face of a cube.
+const ModelFace& cube_face(Direction direction);
+
+// Returns true if a chunk has voxels with shapes. 16 bits per voxel: it may have some.
+bool holds_shapes(const Chunk* chunk, const VoxelRegistry& types);
 
 }  // namespace quoin::blocky
 

@@ -217,21 +217,35 @@ QUOIN_INLINE Words hold_none(const Words (&planes)[kPlanes], const std::uint8_t*
   return none;
 }
 
+// Returns the class of all voxels of kLanes rows if they lie in uniform slabs of one type (Scratch::index_class), else
+// -1. Requires: at most 8 bits per voxel.
+QUOIN_INLINE int class_of_rows(const ChunkStorage& voxels, int y, int z, const Scratch& s) {
+  const std::size_t slab = ChunkStorage::slab_index(y, z);
+  const std::uint32_t entry = voxels.slabs[slab];
+  if ((entry & ChunkStorage::kUniformSlab) == 0) return -1;
+  if (kLanes == 8 && voxels.slabs[slab + 1] != entry) return -1;
+  return s.index_class[entry & ~ChunkStorage::kUniformSlab];
+}
+
 // Computes opacity, and equality of adjacent types if there are several types.
 template <int kPlanes, bool kTypes, bool kTransparent>
-void combine_planes(const SlabRange& range, const OpenIndices& open, Scratch& s) {
+void combine_planes(const ChunkStorage& voxels, const SlabRange& range, const OpenIndices& open, Scratch& s) {
   const std::uint8_t* first_transparent = open.indices + open.air_count;
   for (int z = range.z.begin; z < range.z.end; ++z) {
     for (int y = range.y.begin; y < range.y.end; y += kLanes) {
       const int at = word_index(z, y);
       Words here[kPlanes];
       for (int k = 0; k < kPlanes; ++k) here[k] = load(s.planes[k].words + at);
-      const Words solid = hold_none(here, open.indices, first_transparent);
       if constexpr (kTransparent) {
+        // There may be many transparent types, mostly in few slabs.
+        const int one = class_of_rows(voxels, y, z, s);
+        const Words solid =
+            one < 0 ? hold_none(here, open.indices, first_transparent) : Words{} - static_cast<std::uint64_t>(one != 0);
         store(s.solid.words + at, solid);
-        store(s.z.opaque.words + at, solid & hold_none(here, first_transparent, open.indices + open.count));
+        store(s.z.opaque.words + at, one < 0 ? solid & hold_none(here, first_transparent, open.indices + open.count)
+                                             : Words{} - static_cast<std::uint64_t>(one == 1));
       } else {
-        store(s.z.opaque.words + at, solid);
+        store(s.z.opaque.words + at, hold_none(here, open.indices, first_transparent));
       }
       if constexpr (!kTypes) continue;
       Words along_x{};
@@ -255,11 +269,11 @@ void read_planes(const Job& job, const ChunkStorage& voxels, const SlabRange& ra
   split_planes<kBits, kPlanes>(voxels, range, s);
   const OpenIndices open = open_indices(voxels, s);
   if (job.one_type) {
-    combine_planes<kPlanes, false, false>(range, open, s);
+    combine_planes<kPlanes, false, false>(voxels, range, open, s);
   } else if (job.has_transparent) {
-    combine_planes<kPlanes, true, true>(range, open, s);
+    combine_planes<kPlanes, true, true>(voxels, range, open, s);
   } else {
-    combine_planes<kPlanes, true, false>(range, open, s);
+    combine_planes<kPlanes, true, false>(voxels, range, open, s);
   }
 }
 
@@ -306,7 +320,7 @@ void classify_wide(const Job& job, const ChunkStorage& voxels, const SlabRange& 
       std::uint64_t opaque = solid;
       if (job.has_transparent) {
         s.solid.words[at] = solid;
-        opaque &= ~transparent_cells<kBits>(job, voxels, s, row);
+        if (solid != 0) opaque &= ~transparent_cells<kBits>(job, voxels, s, row);
       }
       s.z.opaque.words[at] = opaque;
       std::uint64_t shifted[kBits];
@@ -380,10 +394,14 @@ class OpaqueVoxels {
     }
     if (voxels_->direct()) return;
     QUOIN_ASSERT(voxels_->palette.size() <= 256, "a palette of at most 8 bits");
+    bool has_some = false;
     for (std::size_t i = 0; i < voxels_->palette.size(); ++i) {
       is_opaque_[i] = job.is_opaque(voxels_->palette[i]);
-      if (is_opaque_[i] == 0 && voxels_->counts[i] != 0) others_[other_count_++] = static_cast<std::uint8_t>(i);
+      if (voxels_->counts[i] == 0) continue;
+      if (is_opaque_[i] == 0) others_[other_count_++] = static_cast<std::uint8_t>(i);
+      has_some |= is_opaque_[i] != 0;
     }
+    if (!has_some) voxels_ = nullptr;
   }
 
   [[nodiscard]] bool none() const { return voxels_ == nullptr && !all_; }
@@ -459,7 +477,7 @@ class OpaqueVoxels {
     return ~mask;
   }
 
-  const ChunkStorage* voxels_ = nullptr;  // null: all or no voxels are opaque
+  const ChunkStorage* voxels_ = nullptr;  // null: all (`all_`) or no voxels are opaque
   const Job* job_;
   bool all_ = false;
   int other_count_ = 0;
@@ -469,7 +487,7 @@ class OpaqueVoxels {
 
 // Gathers the rows of the 8 neighbours with the centre's x. Returns true if a neighbour with another z may have opaque
 // voxels.
-bool gather_rows(const Job& job, Scratch& s) {
+bool gather_rows(const Job& job, Layer& rows) {
   const auto first = [](int d) { return d > 0 ? 64 : d; };
   const auto last = [](int d) { return d < 0 ? -1 : d > 0 ? 64 : 63; };
   bool other_z = false;
@@ -480,7 +498,7 @@ bool gather_rows(const Job& job, Scratch& s) {
       other_z |= dz != 0 && !voxels.none();
       for (int z = first(dz); z <= last(dz); ++z) {
         for (int y = first(dy); y <= last(dy); ++y) {
-          s.z.opaque.words[word_index(z, y)] = voxels.row(y & 63, z & 63);
+          rows.words[word_index(z, y)] = voxels.row(y & 63, z & 63);
         }
       }
     }
@@ -502,7 +520,7 @@ bool has_row_ends(const Job& job) {
 }
 
 // Gathers the voxels before and after the rows of the centre, or of a neighbour with the centre's x.
-void gather_row_ends(const Job& job, int dy, int dz, Scratch& s) {
+void gather_row_ends(const Job& job, int dy, int dz, Layer& ends_of_rows) {
   const OpaqueVoxels before(job.chunks->at(-1, dy, dz), job);
   const OpaqueVoxels after(job.chunks->at(1, dy, dz), job);
   const auto first = [](int d) { return d < 0 ? 63 : 0; };
@@ -517,7 +535,7 @@ void gather_row_ends(const Job& job, int dy, int dz, Scratch& s) {
         if (row_z < -1 || row_z > 64) continue;
         const Four shift = Four{0, 1, 2, 3} + static_cast<std::uint64_t>(4 * i);
         const Four ends = ((rows_before >> shift) << 63) | (rows_after >> shift & 1);
-        std::uint64_t* out = s.z.ends.words + word_index(row_z, y + 64 * dy);
+        std::uint64_t* out = ends_of_rows.words + word_index(row_z, y + 64 * dy);
         if (dy == 0) {
           *reinterpret_cast<UnalignedFour*>(out) = ends;
         } else {
@@ -528,14 +546,14 @@ void gather_row_ends(const Job& job, int dy, int dz, Scratch& s) {
   }
 }
 
-// Gathers rows of opacity around the chunk, from its 26 neighbours, into the z view. Returns true if any voxel before
-// or after a row of any view may be opaque; only then is `ends` written.
-bool gather_border(const Job& job, Scratch& s) {
+// Gathers rows of opacity around the chunk, from its 26 neighbours, in the z view's layout. Returns true if any voxel
+// before or after a row of any view may be opaque; only then is `ends` written.
+bool gather_border(const Job& job, Layer& rows, Layer& ends) {
   // The x view's rows are along z, so the voxels before and after them belong to the neighbours in z.
-  const bool other_z = gather_rows(job, s);
+  const bool other_z = gather_rows(job, rows);
   if (!other_z && !has_row_ends(job)) return false;
   for (int dz = -1; dz <= 1; ++dz) {
-    for (int dy = -1; dy <= 1; ++dy) gather_row_ends(job, dy, dz, s);
+    for (int dy = -1; dy <= 1; ++dy) gather_row_ends(job, dy, dz, ends);
   }
   return true;
 }
@@ -562,7 +580,7 @@ void find_faces_of_all_types(const Job& job, bool row_ends, Scratch& s) {
       put(s.z.faces[1], load(here - kRowStride), load(s.same_z.words + at - kRowStride));
     }
   }
-  if (job.has_transparent) hide_faces_at_border(job, s);
+  if (job.has_transparent && (job.shapes == nullptr || job.shapes->has_transparent_cubes)) hide_faces_at_border(job, s);
 }
 
 }  // namespace
