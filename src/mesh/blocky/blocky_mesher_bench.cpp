@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <benchmark/benchmark.h>
@@ -206,6 +207,60 @@ void mesh_town(benchmark::State& state, bool is_shaped) {
 }
 BENCHMARK_CAPTURE(mesh_town, shapes, true)->Name("shapes/town/mesh")->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(mesh_town, cubes, false)->Name("shapes/town/mesh_cubes")->Unit(benchmark::kMicrosecond);
+
+VoxelFaces faces_of(VoxelType type) {
+  const auto texture = [&](int part) {
+    AlphaImage image{16, 16, std::vector<std::uint8_t>(std::size_t{4} * 16 * 16, 255)};
+    for (std::size_t i = 0; i < image.rgba.size(); i += 4) {
+      image.rgba[i] = static_cast<std::uint8_t>(16 * type + part);
+      image.rgba[i + 1] = static_cast<std::uint8_t>(i / 4);
+    }
+    return *Texture::from_image("texture", image);
+  };
+  return VoxelFaces({texture(0)}, {texture(1)}, {texture(2)});
+}
+
+// Meshes the town with textures on its cubes; a time is per chunk. States turn some cubes. Compares the number of quads
+// with the same voxels without textures and orientations.
+void mesh_textured_town(benchmark::State& state) {
+  const Scene scene = workloads::town_scene(false);
+  VoxelRegistry textured;
+  VoxelRegistry plain;
+  bool is_added = true;
+  for (std::size_t i = 1; i < scene.types.size(); ++i) {
+    const auto type = static_cast<VoxelType>(i);
+    VoxelProperties properties = scene.types[type];
+    properties.faces = faces_of(type);
+    is_added &= textured.add(properties).has_value();
+    properties.faces = {};
+    properties.orientations = {};
+    is_added &= plain.add(std::move(properties)).has_value();
+  }
+  const Grid& grid = scene.grids()[scene.grids().handles().front()].grid;
+  BlockyMesher mesher;
+  QuadBuffer quads;
+  std::size_t textured_quads = 0;
+  std::size_t plain_quads = 0;
+  std::vector<Neighbourhood> chunks;
+  for (const IVec3 chunk : grid.chunks()) {
+    chunks.push_back(grid.neighbourhood(chunk));
+    mesher.mesh(chunks.back(), textured, {}, quads);
+    textured_quads += quads.size();
+    mesher.mesh(chunks.back(), plain, {}, quads);
+    plain_quads += quads.size();
+  }
+  const double share = static_cast<double>(textured_quads) / static_cast<double>(plain_quads);
+  if (!is_added || !(share <= 1.35)) state.SkipWithError("more than 1.35 times the quads of untextured blocks");
+  std::size_t next = 0;
+  for (auto _ : state) {
+    mesher.mesh(chunks[next], textured, {}, quads);
+    benchmark::DoNotOptimize(quads.data());
+    next = next + 1 == chunks.size() ? 0 : next + 1;
+  }
+  state.counters["quads"] = static_cast<double>(textured_quads);
+  state.counters["of_untextured"] = share;
+}
+BENCHMARK(mesh_textured_town)->Name("textures/town/quads")->Unit(benchmark::kMicrosecond);
 
 const bool kRegistered = [] {
   register_set("", instruction_set());
