@@ -25,6 +25,28 @@ class Walk {
     }
   }
 
+  /// Walks of several rays, one after the other, remember the part of the tree that they read last. Call `set_ray`
+  /// first.
+  explicit Walk(const OccupancyTree& tree) : nodes_(tree) {}
+  /// `inverse`: of the direction's components; unused where they are 0.
+  void set_ray(const Ray& ray, const DVec3& inverse) {
+    for (int axis = 0; axis < 3; ++axis) {
+      origin_[axis] = ray.origin[axis];
+      direction_[axis] = ray.direction[axis];
+      inverse_[axis] = inverse[axis];
+    }
+  }
+  /// Begins in a voxel of the bounds that the ray enters at `t` through a plane of `axis`; -1: it starts there.
+  void begin(const IBox& bounds, IVec3 voxel, double t, int axis) {
+    bounds_ = bounds;
+    t_ = t;
+    axis_ = axis;
+    for (int each = 0; each < 3; ++each) {
+      voxel_[each] = voxel[each];
+      find_next(each);
+    }
+  }
+
   /// Moves to where the ray enters the bounds; false when it misses them, or enters beyond `max_t`.
   bool enter(const IBox& bounds, double max_t) {
     double enter_t = 0.0;

@@ -1,7 +1,9 @@
 #include "grid/shapes/shape_index.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <map>
 #include <optional>
 #include <set>
 #include <tuple>
@@ -173,10 +175,6 @@ std::uint32_t number_of(IVec3 local) {
   return static_cast<std::uint32_t>(local.x + kChunkEdge * (local.y + kChunkEdge * local.z));
 }
 
-std::size_t row_of(IVec3 local) {
-  return static_cast<std::size_t>(local.y + kChunkEdge * local.z);
-}
-
 }  // namespace
 
 DBox bounds_of(const ModelBox& box) {
@@ -217,6 +215,172 @@ bool covers(const VoxelRegistry& types, VoxelType neighbour, const ShapeModel* n
   return true;
 }
 
+// Makes the lists of a chunk. Equal lists are made once.
+class ShapeIndex::Lists {
+ public:
+  Lists(const VoxelRegistry& types, ChunkShapes& out) : types_(types), out_(out) {}
+
+  // Adds the shape of a voxel of the chunk, in any order. `touched`: the voxels of the chunk that it touches.
+  void add(IVec3 local, VoxelType type, const ShapeModel& model, const IBox& touched) {
+    const bool is_inside = kWholeChunk.contains(local);
+    if (is_inside) put(local, list_of_one({{}, type, &model}));
+    if (is_inside && touched == IBox{local, local + 1}) return;
+    for (int z = touched.min.z; z < touched.max.z; ++z) {
+      for (int y = touched.min.y; y < touched.max.y; ++y) {
+        for (int x = touched.min.x; x < touched.max.x; ++x) {
+          const IVec3 at{x, y, z};
+          if (at != local) others_.push_back({number_of(at), {offset_of(local - at), type, &model}});
+        }
+      }
+    }
+  }
+
+  // Writes the lists. Returns false if there are none.
+  bool finish(IVec3 origin) {
+    add_others();
+    if (used_ == 0) return false;
+    for (std::uint64_t left = used_; left != 0; left &= left - 1) {
+      pack_brick(static_cast<std::size_t>(std::countr_zero(left)));
+    }
+    const auto range = [](std::uint64_t mask) { return std::pair(std::countr_zero(mask), std::bit_width(mask)); };
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto [first, end] = range(masks_[static_cast<std::size_t>(axis)]);
+      out_.bounds.min[axis] = origin[axis] + first;
+      out_.bounds.max[axis] = origin[axis] + end;
+    }
+    out_.blocks.shrink_to_fit();
+    out_.cells.shrink_to_fit();
+    out_.shapes.shrink_to_fit();
+    out_.boxes.shrink_to_fit();
+    return true;
+  }
+
+ private:
+  struct Entry {
+    std::array<std::int8_t, 3> offset{};
+    VoxelType type = kAir;
+    const ShapeModel* model = nullptr;
+
+    // By the order of lists: z, y, x; then by anything, to find equal lists.
+    [[nodiscard]] auto order() const { return std::tuple(offset[2], offset[1], offset[0], type, model); }
+    bool operator<(const Entry& other) const { return order() < other.order(); }
+  };
+  struct Touch {
+    std::uint32_t cell = 0;
+    Entry entry;
+    bool operator<(const Touch& other) const { return cell != other.cell ? cell < other.cell : entry < other.entry; }
+  };
+
+  static std::array<std::int8_t, 3> offset_of(IVec3 from) {
+    return {static_cast<std::int8_t>(from.x), static_cast<std::int8_t>(from.y), static_cast<std::int8_t>(from.z)};
+  }
+  static IVec3 local_of_number(std::uint32_t number) {
+    const auto n = static_cast<int>(number);
+    return {n % kChunkEdge, n / kChunkEdge % kChunkEdge, n / kChunkEdge / kChunkEdge};
+  }
+
+  void put(IVec3 local, std::uint32_t list) {
+    if (numbers_.empty()) numbers_.resize(kChunkVoxels);  // most chunks next to shapes have none
+    numbers_[number_of(local)] = list + 1;
+    used_ |= std::uint64_t{1} << ChunkShapes::part_of(local, 4);
+  }
+
+  [[nodiscard]] std::uint32_t list_of_one(const Entry& entry) {
+    if (last_ != nullptr && last_->first.model == entry.model && last_->first.type == entry.type) return last_->second;
+    const auto [found, is_new] = single_.try_emplace(entry, 0);
+    if (is_new) found->second = write({&entry, 1});
+    last_ = &*found;
+    return found->second;
+  }
+
+  // Adds the shapes that touch voxels other than their own.
+  void add_others() {
+    std::sort(others_.begin(), others_.end());
+    std::vector<Entry> list;
+    for (std::size_t i = 0; i < others_.size();) {
+      const std::uint32_t cell = others_[i].cell;
+      list.clear();
+      if (!numbers_.empty() && numbers_[cell] != 0) {
+        const ListedShape& own = out_.shapes[numbers_[cell] - 1];
+        list.push_back({{}, own.type, own.model});
+      }
+      for (; i < others_.size() && others_[i].cell == cell; ++i) list.push_back(others_[i].entry);
+      const auto [found, is_new] = several_.try_emplace(list, 0);
+      if (is_new) found->second = write(list);
+      put(local_of_number(cell), found->second);
+    }
+  }
+
+  // Appends a list. Returns the index of its first shape.
+  [[nodiscard]] std::uint32_t write(std::span<const Entry> list) {
+    const auto first = static_cast<std::uint32_t>(out_.shapes.size());
+    for (const Entry& entry : list) {
+      ListedShape& shape = out_.shapes.emplace_back();
+      shape.offset = entry.offset;
+      shape.type = entry.type;
+      shape.is_opaque = types_[entry.type].visibility == Visibility::Opaque;
+      shape.model = entry.model;
+      shape.first_box = boxes_of(*entry.model);
+      shape.box_count = static_cast<std::uint32_t>(entry.model->boxes.size());
+    }
+    out_.shapes[first].count = static_cast<std::uint8_t>(list.size());
+    return first;
+  }
+
+  // Returns the index of the first box of a model.
+  [[nodiscard]] std::uint32_t boxes_of(const ShapeModel& model) {
+    const auto [found, is_new] = models_.try_emplace(&model, static_cast<std::uint32_t>(out_.boxes.size()));
+    if (!is_new) return found->second;
+    for (const ModelBox& box : model.boxes) {
+      out_.boxes.push_back({{box.min.x, box.min.y, box.min.z, box.max.x, box.max.y, box.max.z}, &box});
+    }
+    return found->second;
+  }
+
+  void pack_brick(std::size_t brick) {
+    const IVec3 corner = unit(brick) * 16;
+    out_.bricks[brick] = static_cast<std::uint8_t>(out_.blocks.size() / 64 + 1);
+    for (std::size_t block = 0; block < 64; ++block) pack_block(corner + unit(block) * 4);
+  }
+
+  void pack_block(IVec3 corner) {
+    ChunkShapes::Block& block = out_.blocks.emplace_back();
+    block.first = static_cast<std::uint32_t>(out_.cells.size());
+    bool is_uniform = true;
+    for (std::size_t bit = 0; bit < 64; ++bit) {
+      const std::uint32_t number = numbers_[number_of(corner + unit(bit))];
+      if (number == 0) continue;
+      block.touched |= std::uint64_t{1} << bit;
+      out_.cells.push_back(number - 1);
+      is_uniform &= out_.cells[block.first] == number - 1;
+    }
+    if (block.touched == 0) return;
+    if (is_uniform) out_.cells.resize(block.first + std::size_t{1});
+    block.ranks = is_uniform ? 0 : ~std::uint32_t{0};
+    for (std::uint64_t left = block.touched; left != 0; left &= left - 1) {
+      const IVec3 at = corner + unit(static_cast<std::size_t>(std::countr_zero(left)));
+      for (int axis = 0; axis < 3; ++axis) masks_[static_cast<std::size_t>(axis)] |= std::uint64_t{1} << at[axis];
+    }
+  }
+
+  // Returns the coordinates of a number x + 4 y + 16 z.
+  static IVec3 unit(std::size_t number) {
+    const auto n = static_cast<int>(number);
+    return {n & 3, n >> 2 & 3, n >> 4};
+  }
+
+  const VoxelRegistry& types_;
+  ChunkShapes& out_;
+  std::vector<std::uint32_t> numbers_;    // 1 + the first shape of each voxel's list; 0: none
+  std::uint64_t used_ = 0;                // bricks
+  std::array<std::uint64_t, 3> masks_{};  // touched coordinates by axis
+  std::vector<Touch> others_;
+  std::map<Entry, std::uint32_t> single_;
+  const std::pair<const Entry, std::uint32_t>* last_ = nullptr;  // in `single_`
+  std::map<std::vector<Entry>, std::uint32_t> several_;
+  std::unordered_map<const ShapeModel*, std::uint32_t> models_;
+};
+
 std::shared_ptr<const ShapeIndex::ChunkShapes> ShapeIndex::made(const Grid& grid, IVec3 chunk) const {
   const Neighbourhood near = grid.neighbourhood(chunk);
   std::array<bool, 27> is_read{};
@@ -224,24 +388,14 @@ std::shared_ptr<const ShapeIndex::ChunkShapes> ShapeIndex::made(const Grid& grid
   for (std::size_t i = 0; i < 27; ++i) is_any |= is_read[i] = has_shapes(near.chunks[i], types_);
   if (!is_any) return nullptr;
 
-  struct Touch {
-    std::uint32_t cell;
-    PlacedShape shape;  // `voxel` relative to the chunk
-  };
-  std::vector<Touch> touches;
+  auto result = std::make_shared<ChunkShapes>();
+  Lists lists(types_, *result);
   const NearVoxels voxels{near};
   const SurroundingsFinder finder(voxels, types_);
   std::array<VoxelType, kChunkEdge> row;
   const auto add = [&](IVec3 local, VoxelType type) {
-    const ShapeModel* model = finder.model(local, type);
-    const IBox cells = intersect({local + model->cells.min, local + model->cells.max}, kWholeChunk);
-    for (int z = cells.min.z; z < cells.max.z; ++z) {
-      for (int y = cells.min.y; y < cells.max.y; ++y) {
-        for (int x = cells.min.x; x < cells.max.x; ++x) {
-          touches.push_back({number_of({x, y, z}), {local, type, model}});
-        }
-      }
-    }
+    const ShapeModel& model = *finder.model(local, type);
+    lists.add(local, type, model, intersect({local + model.cells.min, local + model.cells.max}, kWholeChunk));
   };
   // Shapes of neighbouring chunks matter only within one voxel of this chunk.
   for (int z = -1; z <= kChunkEdge; ++z) {
@@ -262,38 +416,7 @@ std::shared_ptr<const ShapeIndex::ChunkShapes> ShapeIndex::made(const Grid& grid
       }
     }
   }
-  if (touches.empty()) return nullptr;
-  const auto order = [](const Touch& t) {
-    const IVec3 v = t.shape.voxel;
-    return std::tuple(t.cell, number_of(v) != t.cell, v.z, v.y, v.x);
-  };
-  std::sort(touches.begin(), touches.end(), [&](const Touch& a, const Touch& b) { return order(a) < order(b); });
-
-  auto result = std::make_shared<ChunkShapes>();
-  result->touched.assign(kChunkEdge * kChunkEdge, 0);
-  result->first.assign(kChunkEdge * kChunkEdge, 0);
-  const IVec3 origin = chunk * kChunkEdge;
-  std::optional<std::uint32_t> last;
-  for (const Touch& touch : touches) {
-    if (touch.cell != last) {
-      last = touch.cell;
-      result->starts.push_back(static_cast<std::uint32_t>(result->shapes.size()));
-      result->touched[touch.cell / kChunkEdge] |= std::uint64_t{1} << (touch.cell % kChunkEdge);
-      const auto cell = static_cast<int>(touch.cell);
-      const IVec3 at =
-          origin + IVec3(cell % kChunkEdge, cell / kChunkEdge % kChunkEdge, cell / kChunkEdge / kChunkEdge);
-      result->bounds = unite(result->bounds, {at, at + 1});
-    }
-    result->shapes.push_back(touch.shape);
-    result->shapes.back().voxel += origin;
-  }
-  result->starts.push_back(static_cast<std::uint32_t>(result->shapes.size()));
-  std::uint32_t count = 0;
-  for (std::size_t i = 0; i < result->touched.size(); ++i) {
-    result->first[i] = count;
-    count += static_cast<std::uint32_t>(std::popcount(result->touched[i]));
-  }
-  return result;
+  return lists.finish(chunk * kChunkEdge) ? result : nullptr;
 }
 
 void ShapeIndex::rebuild(const Grid& grid, IVec3 chunk) {
@@ -361,13 +484,13 @@ std::vector<IVec3> ShapeIndex::update(const Grid& grid, const VoxelRegistry& typ
   return {chunks.begin(), chunks.end()};
 }
 
-std::span<const PlacedShape> ShapeIndex::at(IVec3 voxel) const {
+ShapesAtVoxel ShapeIndex::at(IVec3 voxel) const {
   return Reader(*this).at(voxel);
 }
 
 std::uint64_t ShapeIndex::touched_row(IVec3 voxel) const {
   const auto found = chunks_.find(chunk_of(voxel));
-  return found == chunks_.end() ? 0 : found->second->touched[row_of(local_of(voxel))];
+  return found == chunks_.end() ? 0 : found->second->row(voxel);
 }
 
 IBox ShapeIndex::bounds() const {
@@ -379,9 +502,9 @@ IBox ShapeIndex::bounds() const {
 std::size_t ShapeIndex::bytes() const {
   std::size_t bytes = sizeof(*this);
   for (const auto& [chunk, shapes] : chunks_) {
-    bytes += sizeof(ChunkShapes) + shapes->touched.capacity() * sizeof(std::uint64_t) +
-             (shapes->first.capacity() + shapes->starts.capacity()) * sizeof(std::uint32_t) +
-             shapes->shapes.capacity() * sizeof(PlacedShape);
+    bytes += sizeof(ChunkShapes) + shapes->blocks.capacity() * sizeof(ChunkShapes::Block) +
+             shapes->cells.capacity() * sizeof(std::uint32_t) + shapes->shapes.capacity() * sizeof(ListedShape) +
+             shapes->boxes.capacity() * sizeof(ListedBox);
   }
   return bytes;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -8,6 +9,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/changes.h>
 #include <quoin/grid/grid.h>
@@ -38,6 +40,76 @@ void visit_solid_boxes(const ShapeModel& model, bool with_all, Visit&& visit) {
   if (model.free_faces != 0) visit(DBox{DVec3(model.min), DVec3(model.max)});
 }
 
+// A box of a model, ready for rays: the lower planes along x, y and z, then the upper ones, in the box's own space.
+struct ListedBox {
+  std::array<double, 6> planes{};
+  const ModelBox* box = nullptr;
+};
+
+// A shape that touches a voxel. Equal voxels of a chunk share it.
+struct ListedShape {
+  std::array<std::int8_t, 3> offset{};  // from the touched voxel to the shape's own: -1 to 1
+  std::uint8_t count = 1;               // of the first shape of a list: how many shapes the list has
+  VoxelType type = kAir;
+  bool is_opaque = false;  // its material
+  std::uint32_t first_box = 0;
+  std::uint32_t box_count = 0;
+  const ShapeModel* model = nullptr;
+
+  [[nodiscard]] IVec3 voxel(IVec3 touched) const { return touched + IVec3(offset[0], offset[1], offset[2]); }
+  [[nodiscard]] bool is_own() const { return (offset[0] | offset[1] | offset[2]) == 0; }
+};
+
+// The shapes that touch a voxel: its own first, then in the order of their voxels (z, y, x). Lifetime: until the next
+// update of the index.
+class ShapesAtVoxel {
+ public:
+  class Iterator {
+   public:
+    using value_type = PlacedShape;
+    using difference_type = std::ptrdiff_t;
+    Iterator() = default;
+    Iterator(const ShapesAtVoxel* of, std::size_t i) : of_(of), i_(i) {}
+    [[nodiscard]] PlacedShape operator*() const { return (*of_)[i_]; }
+    Iterator& operator++() {
+      ++i_;
+      return *this;
+    }
+    Iterator operator++(int) { return {of_, i_++}; }
+    bool operator==(const Iterator& other) const { return i_ == other.i_; }
+
+   private:
+    const ShapesAtVoxel* of_ = nullptr;
+    std::size_t i_ = 0;
+  };
+
+  ShapesAtVoxel() = default;
+  ShapesAtVoxel(const ListedShape* first, const ListedBox* boxes, IVec3 voxel)
+      : first_(first), boxes_(boxes), voxel_(voxel) {}
+
+  [[nodiscard]] bool empty() const { return first_ == nullptr; }
+  [[nodiscard]] std::size_t size() const { return first_ == nullptr ? 0 : first_->count; }
+  [[nodiscard]] PlacedShape operator[](std::size_t i) const {
+    QUOIN_ASSERT(i < size(), "one of the shapes");
+    return {first_[i].voxel(voxel_), first_[i].type, first_[i].model};
+  }
+  [[nodiscard]] Iterator begin() const { return {this, 0}; }
+  [[nodiscard]] Iterator end() const { return {this, size()}; }
+  // Returns true if the voxel itself has a shape.
+  [[nodiscard]] bool has_own() const { return first_ != nullptr && first_->is_own(); }
+  [[nodiscard]] IVec3 voxel() const { return voxel_; }
+  [[nodiscard]] std::span<const ListedShape> listed() const { return {first_, size()}; }
+  // Returns the boxes of one of the listed shapes.
+  [[nodiscard]] std::span<const ListedBox> boxes(const ListedShape& shape) const {
+    return {boxes_ + shape.first_box, shape.box_count};
+  }
+
+ private:
+  const ListedShape* first_ = nullptr;
+  const ListedBox* boxes_ = nullptr;
+  IVec3 voxel_{0};
+};
+
 // The shaped voxels of a grid, by the voxels that they touch: a shape may reach outside its own voxel. Chunks without
 // shapes take no memory; a copy shares all chunks with the original until either is updated.
 class ShapeIndex {
@@ -49,7 +121,7 @@ class ShapeIndex {
    public:
     explicit Reader(const ShapeIndex& index) : index_(&index) {}
     // As ShapeIndex::at.
-    [[nodiscard]] std::span<const PlacedShape> at(IVec3 voxel) {
+    [[nodiscard]] ShapesAtVoxel at(IVec3 voxel) {
       const IVec3 chunk = chunk_of(voxel);
       if (chunk != chunk_ || !is_begun_) {
         const auto found = index_->chunks_.find(chunk);
@@ -57,7 +129,7 @@ class ShapeIndex {
         chunk_ = chunk;
         is_begun_ = true;
       }
-      return known_ == nullptr ? std::span<const PlacedShape>() : known_->at(local_of(voxel));
+      return known_ == nullptr ? ShapesAtVoxel() : known_->at(voxel);
     }
 
    private:
@@ -80,7 +152,7 @@ class ShapeIndex {
   [[nodiscard]] std::vector<IVec3> chunks() const;
   // Returns the shapes that touch a voxel, its own first, then in the order of their voxels (z, y, x). Lifetime: until
   // the next update. Cost: one hash lookup.
-  [[nodiscard]] std::span<const PlacedShape> at(IVec3 voxel) const;
+  [[nodiscard]] ShapesAtVoxel at(IVec3 voxel) const;
   [[nodiscard]] bool touches(IVec3 voxel) const { return !at(voxel).empty(); }
   // Returns the row of 64 voxels along x that contains a voxel: bit i is set if shapes touch voxel i of the row.
   [[nodiscard]] std::uint64_t touched_row(IVec3 voxel) const;
@@ -89,14 +161,11 @@ class ShapeIndex {
   void for_each_in(IVec3 chunk, Visit&& visit) const {
     const auto found = chunks_.find(chunk);
     if (found == chunks_.end()) return;
-    const ChunkShapes& all = *found->second;
-    std::size_t cell = 0;
-    for (std::size_t row = 0; row < all.touched.size(); ++row) {
-      for (std::uint64_t left = all.touched[row]; left != 0; left &= left - 1, ++cell) {
-        const PlacedShape& shape = all.shapes[all.starts[cell]];  // the cell's own, if it has one
-        const auto i = static_cast<int>(row);
-        if (shape.voxel == chunk * kChunkEdge + IVec3(std::countr_zero(left), i % kChunkEdge, i / kChunkEdge))
-          visit(shape);
+    for (int i = 0; i < kChunkEdge * kChunkEdge; ++i) {
+      const IVec3 first = chunk * kChunkEdge + IVec3(0, i % kChunkEdge, i / kChunkEdge);
+      for (std::uint64_t left = found->second->row(first); left != 0; left &= left - 1) {
+        const ShapesAtVoxel here = found->second->at(first + IVec3(std::countr_zero(left), 0, 0));
+        if (here.has_own()) visit(here[0]);
       }
     }
   }
@@ -110,23 +179,58 @@ class ShapeIndex {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  // Voxels are numbered x + 64 y + 4096 z. `touched` has a bit for each; `first[i]` is the number of set bits before
-  // row i, and cell k of those lists shapes[starts[k]] to shapes[starts[k + 1]].
+  // A chunk has 4^3 bricks of 4^3 blocks of 4^3 voxels, each numbered x + 4 y + 16 z. Only bricks with touched voxels
+  // have blocks. The voxels of a chunk share equal lists: a voxel takes four bytes, and so does a block of equal
+  // voxels.
+  //
+  //   bricks     0  0  1  0  2 ...         0: no blocks; else 1 + the brick's place in `blocks`, in units of 64
+  //   blocks     touched, first, ranks     one bit per voxel; the k-th touched voxel has cells[first + (k & ranks)]
+  //   cells      3  3  0 ...               the first shape of a list in `shapes`; that shape has the list's length
   struct ChunkShapes {
-    std::vector<std::uint64_t> touched;
-    std::vector<std::uint32_t> first;
-    std::vector<std::uint32_t> starts;
-    std::vector<PlacedShape> shapes;
+    struct Block {
+      std::uint64_t touched = 0;
+      std::uint32_t first = 0;
+      std::uint32_t ranks = 0;  // all bits are set, or none if all touched voxels have the same list
+    };
+    std::array<std::uint8_t, 64> bricks{};
+    std::vector<Block> blocks;
+    std::vector<std::uint32_t> cells;
+    std::vector<ListedShape> shapes;
+    std::vector<ListedBox> boxes;
     IBox bounds;  // voxels of the grid
 
-    [[nodiscard]] std::span<const PlacedShape> at(IVec3 local) const {
-      const auto number = static_cast<std::size_t>(local.y + kChunkEdge * local.z);
-      const std::uint64_t row = touched[number];
-      if ((row >> local.x & 1U) == 0) return {};
-      const std::size_t cell = first[number] + packed_row::count_bits(row & ((std::uint64_t{1} << local.x) - 1));
-      return std::span(shapes).subspan(starts[cell], starts[cell + 1] - starts[cell]);
+    // `voxel`: of the grid, in this chunk.
+    [[nodiscard]] ShapesAtVoxel at(IVec3 voxel) const {
+      const std::uint32_t brick = bricks[part_of(voxel, 4)];
+      if (brick == 0) return {};
+      const Block& block = blocks[(brick - 1) * 64 + part_of(voxel, 2)];
+      const std::size_t bit = part_of(voxel, 0);
+      if ((block.touched >> bit & 1U) == 0) return {};
+      const std::uint32_t rank = packed_row::count_bits(block.touched & ((std::uint64_t{1} << bit) - 1));
+      return {&shapes[cells[block.first + (rank & block.ranks)]], boxes.data(), voxel};
+    }
+    // Returns the row of voxels along x that contains a voxel, as bits.
+    [[nodiscard]] std::uint64_t row(IVec3 voxel) const {
+      std::uint64_t bits = 0;
+      const IVec3 first{0, voxel.y, voxel.z};
+      const std::size_t shift = part_of(first, 0);
+      for (std::size_t x = 0; x < 4; ++x) {
+        const std::uint32_t brick = bricks[part_of(first, 4) + x];
+        if (brick == 0) continue;
+        const Block* const of_brick = &blocks[(brick - 1) * 64 + part_of(first, 2)];
+        for (std::size_t block = 0; block < 4; ++block) {
+          bits |= (of_brick[block].touched >> shift & 15U) << (16 * x + 4 * block);
+        }
+      }
+      return bits;
+    }
+    // Returns the number of the unit of 2^shift voxels in the next larger one.
+    static std::size_t part_of(IVec3 voxel, int shift) {
+      return static_cast<std::size_t>((voxel.x >> shift & 3) + 4 * (voxel.y >> shift & 3) +
+                                      16 * (voxel.z >> shift & 3));
     }
   };
+  class Lists;
 
   [[nodiscard]] std::shared_ptr<const ChunkShapes> made(const Grid& grid, IVec3 chunk) const;
   void rebuild(const Grid& grid, IVec3 chunk);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <random>
 #include <utility>
 #include <vector>
 
@@ -437,6 +438,87 @@ TEST(ShapeIndex, ListsShapesInVoxelsThatTheyTouchAndFollowsEdits) {
   ShapeIndex fresh;
   fresh.build(grid, types);
   EXPECT_EQ(index.bounds(), fresh.bounds());
+}
+
+// Lists the shapes that touch a voxel, as ShapeIndex::at does.
+std::vector<PlacedShape> touching(const Grid& grid, const VoxelRegistry& types, IVec3 at) {
+  std::vector<PlacedShape> result;
+  for (int i = -1; i < 27; ++i) {
+    if (i == 13) continue;
+    const IVec3 voxel = i < 0 ? at : at + IVec3(i % 3, i / 3 % 3, i / 9) - 1;
+    const ShapeModel* const model = shape_at(grid, types, voxel);
+    const IVec3 offset = at - voxel;
+    if (model != nullptr && model->cells.contains(offset)) result.push_back({voxel, grid.get(voxel), model});
+  }
+  return result;
+}
+
+TEST(ShapeIndex, ListsEqualThoseOfEachVoxel) {
+  VoxelRegistry types;
+  const VoxelType stone = *types.add({.name = "stone"});
+  const VoxelType half = *types.add({.name = "slab", .shapes = slab()});
+  const VoxelType post = *types.add({.name = "fence", .shapes = fence()});
+  const VoxelType wide = *types.add(
+      {.name = "wide", .shapes = *VoxelShape::from_elements({{.min = Vec3(-16, 0, -8), .max = Vec3(24, 24, 32)}})});
+  const VoxelType water = add_water(types);
+  const std::array<VoxelType, 6> all = {stone, half, post, wide, water, water};
+  std::mt19937 random(5);
+  Grid grid;
+  for (int i = 0; i < 260; ++i) {
+    const auto below = [&](unsigned n) { return static_cast<int>(random() % n); };
+    grid.set(IVec3(below(12), below(12), below(12)) - 6, all[random() % all.size()],
+             {static_cast<std::uint32_t>(random() % 4), {}});
+  }
+  grid.fill_box({{20, 20, 20}, {29, 29, 29}}, water);
+  ShapeIndex index;
+  index.build(grid, types);
+  IBox bounds;
+  std::size_t touched = 0;
+  std::size_t shaped = 0;
+  ShapeIndex::Reader reader(index);
+  const auto expect_at = [&](IVec3 at) {
+    const std::vector<PlacedShape> wanted = touching(grid, types, at);
+    const ShapesAtVoxel found = reader.at(at);
+    ASSERT_EQ(found.size(), wanted.size()) << at.x << ' ' << at.y << ' ' << at.z;
+    EXPECT_EQ(found.empty(), wanted.empty());
+    EXPECT_EQ(found.has_own(), types.is_shaped(grid.get(at)));
+    EXPECT_EQ((index.touched_row(at) >> (at.x & (kChunkEdge - 1)) & 1U) != 0, !wanted.empty());
+    std::size_t i = 0;
+    for (const PlacedShape& shape : found) {
+      EXPECT_EQ(shape.voxel, wanted[i].voxel);
+      EXPECT_EQ(shape.type, wanted[i].type);
+      EXPECT_EQ(shape.model, wanted[i].model);
+      ASSERT_EQ(found.boxes(found.listed()[i]).size(), shape.model->boxes.size());
+      ++i;
+    }
+    if (!wanted.empty()) bounds = unite(bounds, {at, at + 1});
+    touched += wanted.empty() ? 0 : 1;
+    shaped += found.has_own() ? 1 : 0;
+  };
+  for (const IBox& box : {IBox{IVec3(-9), IVec3(9)}, IBox{IVec3(18), IVec3(31)}}) {
+    for (int i = 0; i < box.size().x * box.size().y * box.size().z; ++i) {
+      const IVec3 size = box.size();
+      expect_at(box.min + IVec3(i % size.x, i / size.x % size.y, i / size.x / size.y));
+    }
+  }
+  EXPECT_EQ(index.bounds(), bounds);
+  EXPECT_GT(touched, shaped + 100);
+  std::size_t visited = 0;
+  for (const IVec3 chunk : index.chunks()) index.for_each_in(chunk, [&](const PlacedShape&) { ++visited; });
+  EXPECT_EQ(visited, shaped);
+}
+
+// Blocks of equal voxels share their list.
+TEST(ShapeIndex, OceanTakesLessThanOneBytePerVoxel) {
+  VoxelRegistry types;
+  const VoxelType water = add_water(types);
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {2 * kChunkEdge, kChunkEdge, kChunkEdge}}, water);
+  ShapeIndex index;
+  index.build(grid, types);
+  EXPECT_LT(static_cast<double>(index.bytes()), 0.6 * kChunkVoxels * 2);
+  EXPECT_EQ(index.at({70, 63, 5})[0].model, shape_at(grid, types, {70, 63, 5}));
+  EXPECT_EQ(index.at({70, 62, 5})[0].model, shape_at(grid, types, {70, 62, 5}));
 }
 
 }  // namespace

@@ -64,9 +64,10 @@ class BodiesOfGrid {
     const TracedShapes& shapes = *placed_.shapes;
     visit_hits(shapes.glass, ray_, max_t_, [&](const VoxelSpan& cell) {
       const std::size_t old_size = parts_.size();
-      for (const PlacedShape& shape : shapes.index.at(cell.voxel)) {
+      const ShapesAtVoxel here = shapes.index.at(cell.voxel);
+      for (const ListedShape& shape : here.listed()) {
         if (shape.type >= shapes.is_glass.size() || shapes.is_glass[shape.type] == 0) continue;
-        visit_shape(shape, ray_, [&](const ShapeSpan& span) { note_part(span, cell); });
+        visit_shape(here, shape, ray_, [&](const ShapeSpan& span) { note_part(span, cell); });
       }
       std::sort(parts_.begin() + static_cast<std::ptrdiff_t>(old_size), parts_.end(),
                 [](const GlassBody& a, const GlassBody& b) { return a.t_enter < b.t_enter; });
@@ -214,7 +215,7 @@ class BodiesOfGrid {
 
   // Notes the part of a shape's glass within a cell.
   void note_part(const ShapeSpan& span, const VoxelSpan& cell) {
-    const ShapeModel& model = *span.shape->model;
+    const ShapeModel& model = *span.shape.model;
     const bool is_plate = span.enter.t == span.exit.t;
     const double t_enter = std::max(span.enter.t, cell.t_enter);
     const double t_exit = std::min({span.exit.t, cell.t_exit, max_t_});
@@ -222,11 +223,11 @@ class BodiesOfGrid {
     const bool starts_inside = span.starts_inside();
     if (!starts_inside && span.enter.face < 0) return;
     const ModelFace* const face = starts_inside ? nullptr : &model.faces[static_cast<std::size_t>(span.enter.face)];
-    const VoxelFace* const look = face == nullptr ? nullptr : look_of(model, *face, (*types_)[span.shape->type].faces);
+    const VoxelFace* const look = face == nullptr ? nullptr : look_of(model, *face, (*types_)[span.shape.type].faces);
     const bool has_texture = look != nullptr && !look->texture.is_null();
     if (has_texture && look->alpha != FaceAlpha::Translucent) return;  // no glass
     GlassBody& part = parts_.emplace_back();
-    fill_in(part, span.shape->voxel, span.shape->type, t_enter, t_exit);
+    fill_in(part, span.shape.voxel, span.shape.type, t_enter, t_exit);
     part.starts_inside = starts_inside;
     part.voxels = is_plate ? kThinnest : voxels_between(t_enter, t_exit);
     part.model = &model;
@@ -237,7 +238,7 @@ class BodiesOfGrid {
     part.face = nearest_direction(DVec3(part.normal));
     part.exit_face = nearest_direction(DVec3(part.exit_normal));
     if (!has_texture) return;
-    const DVec3 point = ray_.origin + ray_.direction * span.enter.t - DVec3(span.shape->voxel);
+    const DVec3 point = ray_.origin + ray_.direction * span.enter.t - DVec3(span.shape.voxel);
     part.is_textured = true;
     part.texel = shape_texel(*face, *look, point);
     part.look = look;

@@ -11,6 +11,7 @@
 #include "grid/shapes/shape_index.h"
 #include "grid/shapes/shape_types_for_tests.h"
 #include "scene/query/field_scene_for_tests.h"
+#include "scene/tracer/scene_view.h"
 
 namespace quoin {
 namespace {
@@ -249,6 +250,75 @@ TEST(ShapeQuery, TurnedElementsGiveTheirNormal) {
   EXPECT_NEAR(std::abs(hit->normal.x), std::sqrt(0.5), 1e-6);
   EXPECT_NEAR(hit->normal.z, -std::sqrt(0.5), 1e-6);
   EXPECT_LT(glm::dot(DVec3(normal_of(hit->face)), DVec3(0.0, 0.0, 1.0)) - 0.5, 0.0);
+}
+
+// A town whose shapes and cubes are near each other, and some far away.
+Scene shapes_and_cubes(Random& random) {
+  Scene scene;
+  const ShapeTypes types(scene.types);
+  const std::vector<VoxelType> all = {types.stone,  types.slab, types.stairs, types.fence, types.torch,
+                                      types.flower, types.door, types.beam,   types.water, types.pane};
+  SceneGrid grid;
+  const auto put = [&](IVec3 at) {
+    grid.grid.set(at, all[random.engine() % all.size()], {static_cast<std::uint32_t>(random.engine() % 6), {}});
+  };
+  for (int i = 0; i < 300; ++i) put(IVec3(random.vector() * 9.0));  // across the corner of eight chunks
+  for (int i = 0; i < 60; ++i) put(IVec3(random.vector() * 150.0));
+  scene.add_instance({.grid = scene.add_grid(std::move(grid))});
+  return scene;
+}
+
+// Rays of packets ask lists of shapes and trees of voxels together; single rays ask one after the other.
+TEST(ShapeQuery, PacketsAgreeWithSingleRays) {
+  int in_shapes = 0;
+  int in_cubes = 0;
+  int blocked = 0;
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    Random random(seed);
+    const Scene scene = shapes_and_cubes(random);
+    const SceneTracer tracer(scene);
+    const SceneView view(tracer, DVec3(0.0));
+    const QueryFilter filter{.types = QueryTypes::Opaque};
+    for (int number = 0; number < 60; ++number) {
+      RayPacket packet;
+      const Ray middle = ray_of(number, random);
+      for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+        const double spread = number % 3 == 0 ? 0.0 : number % 3 == 1 ? 0.02 : 1.0;
+        const Ray ray{middle.origin + (0.5 + spread) * random.vector(), middle.direction + spread * random.vector()};
+        packet.set(lane, ray, lane % 4 == 0 ? 8.0 * random.share() : kNone);
+      }
+      packet.active = number % 5 == 0 ? 0x5A5AU : 0xFFFFU;
+      SceneHits hits;
+      view.first_hits(packet, hits);
+      const std::uint32_t any = view.any_hits(0, packet);
+      EXPECT_EQ(hits.grids.hit & ~packet.active, 0U);
+      for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+        if ((packet.active >> lane & 1U) == 0) continue;
+        SCOPED_TRACE(testing::Message() << "seed " << seed << ", packet " << number << ", lane " << lane);
+        const auto i = static_cast<std::size_t>(lane);
+        const auto wanted = first_hit(tracer, packet.ray(lane), packet.max_t[i], filter);
+        ASSERT_EQ((hits.grids.hit >> lane & 1U) != 0, wanted.has_value());
+        ASSERT_EQ((any >> lane & 1U) != 0, wanted.has_value());
+        blocked += wanted.has_value() ? 0 : 1;
+        if (!wanted) continue;
+        const RayHit hit = hits.grids[lane];
+        ASSERT_EQ(hit.t, wanted->t);
+        EXPECT_EQ(hit.voxel, wanted->voxel);
+        EXPECT_EQ(hit.face, wanted->face);
+        EXPECT_EQ(hit.starts_inside, wanted->starts_inside);
+        const bool in_shape = (hits.in_shape >> lane & 1U) != 0;
+        EXPECT_EQ(in_shape, scene.types.is_shaped(wanted->type));
+        if (in_shape) {
+          EXPECT_EQ(hits.shapes[i].type, wanted->type);
+          EXPECT_LT(glm::distance(glm::normalize(DVec3(hits.shapes[i].normal)), wanted->normal), 1e-6);
+        }
+        (in_shape ? in_shapes : in_cubes) += 1;
+      }
+    }
+  }
+  EXPECT_GT(in_shapes, 100);
+  EXPECT_GT(in_cubes, 20);
+  EXPECT_GT(blocked, 300);
 }
 
 TEST(ShapeQuery, DepthOfPixelFindsShape) {

@@ -91,7 +91,9 @@ std::uint32_t blocked_by_field(const PlacedGrid& placed, const RayPacket& rays_i
 // Sets `blocked[i]` to the rays of packet i that hit an opaque voxel or shape of a placed grid. They are in its space.
 void find_blocked(const PlacedGrid& placed, const VoxelRegistry& types, std::span<const RayPacket> packets_in_grid,
                   std::span<std::uint32_t> blocked) {
-  if (placed.shapes != nullptr) return any_solids(*placed.shapes, *placed.opaque, types, packets_in_grid, blocked);
+  if (placed.shapes != nullptr) {
+    return any_solids(*placed.shapes, *placed.opaque, *placed.voxels, types, packets_in_grid, blocked);
+  }
   if (has_opaque(placed)) return quoin::any_hits(*placed.opaque, packets_in_grid, blocked);
   std::fill_n(blocked.begin(), packets_in_grid.size(), 0U);
 }
@@ -100,7 +102,8 @@ void find_blocked(const PlacedGrid& placed, const VoxelRegistry& types, std::spa
 std::uint32_t blocked_by(const PlacedGrid& placed, const VoxelRegistry& types, const RayPacket& rays_in_grid) {
   std::uint32_t blocked = 0;
   if (placed.shapes != nullptr) {
-    any_solids(*placed.shapes, *placed.opaque, types, std::span(&rays_in_grid, 1), std::span(&blocked, 1));
+    any_solids(*placed.shapes, *placed.opaque, *placed.voxels, types, std::span(&rays_in_grid, 1),
+               std::span(&blocked, 1));
   } else if (has_opaque(placed)) {
     blocked = quoin::any_hits(*placed.opaque, rays_in_grid);
   }

@@ -5,13 +5,16 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <utility>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/gtc/type_ptr.hpp>
 
 #include <quoin/core/assert.h>
 #include <quoin/grid/texture.h>
+
+#include "trace/walk.h"
 
 namespace quoin {
 namespace {
@@ -28,51 +31,79 @@ Direction side_of(int axis, bool is_upper) {
   return static_cast<Direction>(2 * axis + (is_upper ? 0 : 1));
 }
 
-// Finds the way of a ray, relative to the shape's voxel, through a box. Returns false if there is none.
-bool cross_box(const ModelBox& box, const Ray& ray, const DVec3& inverse_direction, ShapeSpan& span) {
-  DVec3 origin = ray.origin;
-  DVec3 direction = ray.direction;
-  DVec3 inverse = inverse_direction;
-  if (box.is_turned) {
-    const DVec3 from = ray.origin - DVec3(box.origin);
+// A ray in the space of a box.
+class BoxRay {
+ public:
+  BoxRay(const DVec3& origin, const DVec3& direction) : origin_(origin), inverse_(1.0 / direction) {
     for (int axis = 0; axis < 3; ++axis) {
-      const Vec3& row = box.inverse[static_cast<std::size_t>(axis)];
-      origin[axis] = component(row, from);
-      direction[axis] = component(row, ray.direction);
+      const auto i = static_cast<std::size_t>(axis);
+      const bool is_backward = std::signbit(inverse_[axis]);
+      near_[i] = static_cast<std::uint32_t>(axis + (is_backward ? 3 : 0));
+      far_[i] = static_cast<std::uint32_t>(axis + (is_backward ? 0 : 3));
+      has_still_axis_ |= std::isinf(inverse_[axis]);
     }
-    inverse = 1.0 / direction;
   }
-  span.enter.t = -kFar;
-  span.exit.t = kFar;
-  int enter_axis = -1;
-  int exit_axis = -1;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double low = box.min[axis];
-    const double high = box.max[axis];
-    if (direction[axis] == 0.0) {
-      if (origin[axis] < low || origin[axis] > high || low == high) return false;
-      continue;
+
+  void set_origin(const DVec3& origin) { origin_ = origin; }
+  // Returns the inverse of the direction's components: infinite where they are 0.
+  [[nodiscard]] const DVec3& inverse() const { return inverse_; }
+
+  // Finds the way through a box as far as it lies between `least` and `most`. Returns false if there is none.
+  [[nodiscard]] bool cross(const ListedBox& box, double least, double most, ShapeSpan::End& enter_end,
+                           ShapeSpan::End& exit_end) const {
+    std::array<double, 3> near;
+    std::array<double, 3> far;
+    double enter = -kFar;
+    double exit = kFar;
+    // No branches: rays through small boxes miss about as often as they hit. A distance that is NaN, since the ray runs
+    // in the plane, does not count.
+    for (std::size_t i = 0; i < 3; ++i) {
+      near[i] = (box.planes[near_[i]] - of(origin_, i)) * of(inverse_, i);
+      far[i] = (box.planes[far_[i]] - of(origin_, i)) * of(inverse_, i);
+      enter = near[i] > enter ? near[i] : enter;
+      exit = far[i] < exit ? far[i] : exit;
     }
-    const bool is_forward = direction[axis] > 0.0;
-    const double near = ((is_forward ? low : high) - origin[axis]) * inverse[axis];
-    const double far = ((is_forward ? high : low) - origin[axis]) * inverse[axis];
+    if (!((enter > least ? enter : least) <= (exit < most ? exit : most))) return false;
+    if (has_still_axis_ && runs_in_plate(box)) return false;
     // If a ray crosses several planes at once, the last one counts, as for voxels.
-    if (near >= span.enter.t) {
-      span.enter.t = near;
-      enter_axis = axis;
-    }
-    if (far < span.exit.t) {
-      span.exit.t = far;
-      exit_axis = axis;
-    }
+    const std::size_t enter_axis = near[2] == enter ? 2 : near[1] == enter ? 1 : 0;
+    const std::size_t exit_axis = far[0] == exit ? 0 : far[1] == exit ? 1 : 2;
+    if (enter == exit ? enter_axis != exit_axis : exit == 0.0) return false;
+    const Direction enter_side = side_of(static_cast<int>(enter_axis), near_[enter_axis] >= 3);
+    const Direction exit_side = side_of(static_cast<int>(exit_axis), near_[exit_axis] < 3);
+    enter_end = {enter, box.box->faces[static_cast<std::size_t>(enter_side)], enter_side};
+    exit_end = {exit, box.box->faces[static_cast<std::size_t>(exit_side)], exit_side};
+    return true;
   }
-  if (!(span.enter.t <= span.exit.t) || !(span.exit.t >= 0.0)) return false;
-  if (span.enter.t == span.exit.t ? enter_axis != exit_axis : span.exit.t == 0.0) return false;
-  span.enter.side = side_of(enter_axis, direction[enter_axis] < 0.0);
-  span.exit.side = side_of(exit_axis, direction[exit_axis] > 0.0);
-  span.enter.face = box.faces[static_cast<std::size_t>(span.enter.side)];
-  span.exit.face = box.faces[static_cast<std::size_t>(span.exit.side)];
-  return true;
+
+ private:
+  static double of(const DVec3& v, std::size_t i) { return glm::value_ptr(v)[i]; }
+  [[nodiscard]] bool runs_in_plate(const ListedBox& box) const {
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (std::isinf(of(inverse_, i)) && box.planes[i] == box.planes[i + 3]) return true;
+    }
+    return false;
+  }
+
+  DVec3 origin_;
+  DVec3 inverse_;
+  // Indices in ListedBox::planes of the planes that the ray meets first and last.
+  std::array<std::uint32_t, 3> near_{};
+  std::array<std::uint32_t, 3> far_{};
+  bool has_still_axis_ = false;
+};
+
+// Returns a ray, relative to the shape's voxel, in the space of a turned box.
+BoxRay turned(const ModelBox& box, const Ray& ray) {
+  const DVec3 from = ray.origin - DVec3(box.origin);
+  DVec3 origin;
+  DVec3 direction;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vec3& row = box.inverse[static_cast<std::size_t>(axis)];
+    origin[axis] = component(row, from);
+    direction[axis] = component(row, ray.direction);
+  }
+  return {origin, direction};
 }
 
 // Returns where a ray, relative to the shape's voxel, crosses a face; NaN if it does not. Neighbouring faces agree
@@ -94,7 +125,7 @@ double crossing_of(const ModelFace& face, const Ray& ray) {
 
 // Visits the ways of a ray, relative to the shape's voxel, through the closed surface of the free faces.
 template <class Visit>
-void cross_fluid(const ShapeModel& model, const Ray& ray, ShapeSpan& span, const Visit& visit) {
+void cross_fluid(const ShapeModel& model, const Ray& ray, const Visit& visit) {
   struct Crossing {
     ShapeSpan::End end;
     bool enters = false;
@@ -110,199 +141,168 @@ void cross_fluid(const ShapeModel& model, const Ray& ray, ShapeSpan& span, const
   std::sort(crossings.begin(), crossings.begin() + static_cast<std::ptrdiff_t>(count),
             [](const Crossing& a, const Crossing& b) { return a.end.t != b.end.t ? a.end.t < b.end.t : a.enters; });
   bool is_inside = false;
+  ShapeSpan::End enter;
   for (std::size_t i = 0; i < count; ++i) {
+    const ShapeSpan::End& end = crossings[i].end;
     if (crossings[i].enters) {
-      if (!is_inside) span.enter = crossings[i].end;
+      if (!is_inside) enter = end;
       is_inside = true;
-    } else if (std::exchange(is_inside, false)) {
-      span.exit = crossings[i].end;
-      if (span.exit.t > 0.0 && span.exit.t > span.enter.t) visit(span);
+    } else if (std::exchange(is_inside, false) && end.t > 0.0 && end.t > enter.t) {
+      visit(enter, end);
     }
   }
 }
 
+// Calls `visit(box, enter, exit)` for the ways of a ray through the parts of a shape as far as they lie between `least`
+// and `most`, and for some others through fluids, whose box is null. `straight`: the ray, from any origin.
 template <class Visit>
-void cross_shape(const PlacedShape& shape, const Ray& ray_in_grid, const DVec3& inverse_direction, const Visit& visit) {
-  const ShapeModel& model = *shape.model;
-  const Ray ray{ray_in_grid.origin - DVec3(shape.voxel), ray_in_grid.direction};
-  ShapeSpan span;
-  span.shape = &shape;
-  for (const ModelBox& box : model.boxes) {
-    span.box = &box;
-    if (cross_box(box, ray, inverse_direction, span)) visit(static_cast<const ShapeSpan&>(span));
+void cross_shape(const ShapesAtVoxel& here, const ListedShape& shape, const Ray& ray_in_grid, BoxRay& straight,
+                 double least, double most, const Visit& visit) {
+  const Ray ray{ray_in_grid.origin - DVec3(shape.voxel(here.voxel())), ray_in_grid.direction};
+  straight.set_origin(ray.origin);
+  ShapeSpan::End enter;
+  ShapeSpan::End exit;
+  for (const ListedBox& box : here.boxes(shape)) {
+    const bool is_met = box.box->is_turned ? turned(*box.box, ray).cross(box, least, most, enter, exit)
+                                           : straight.cross(box, least, most, enter, exit);
+    if (is_met) visit(box.box, enter, exit);
   }
-  if (model.free_faces == 0) return;
-  span.box = nullptr;
-  cross_fluid(model, ray, span, visit);
+  if (shape.model->free_faces == 0) return;
+  cross_fluid(*shape.model, ray, [&](const ShapeSpan::End& in, const ShapeSpan::End& out) { visit(nullptr, in, out); });
 }
 
-// Returns true if a face hides the background at a point, relative to the shape's voxel.
+// Returns true if a face of a type that is not opaque hides the background at a point, relative to the shape's voxel.
 bool is_visible_at(const VoxelProperties& type, const ShapeModel& model, const ModelFace& face, const DVec3& point) {
-  if (type.visibility == Visibility::Opaque) return true;
   const VoxelFace* const look = look_of(model, face, type.faces);
   if (look == nullptr || look->texture.is_null() || look->alpha == FaceAlpha::Translucent) return false;
   if (look->alpha == FaceAlpha::Opaque) return true;
   return shape_texel(face, *look, point).a >= kCutoutAlpha;
 }
 
-// The way of a ray from cell to cell. Each plane is crossed at the same distance as in trace::Walk, which is faster on
-// long ways.
-class CellSteps {
- public:
-  // `inverse`: of the direction's components; unused where they are 0.
-  CellSteps(const Ray& ray, const DVec3& inverse, IVec3 cell, double t)
-      : ray_(ray), inverse_(inverse), cell_(cell), t_(t) {
-    for (int axis = 0; axis < 3; ++axis) find_next(axis);
-  }
-  [[nodiscard]] IVec3 cell() const { return cell_; }
-  // Return the distance of the ray's entry into the cell and, after a step, the face of entry.
-  [[nodiscard]] double t() const { return t_; }
-  [[nodiscard]] Direction face() const { return side_of(axis_, ray_.direction[axis_] < 0.0); }
-  [[nodiscard]] double t_exit() const { return std::min(std::min(next_[0], next_[1]), next_[2]); }
-  void step() {
-    if (next_[0] <= next_[1]) {
-      axis_ = next_[0] <= next_[2] ? 0 : 2;
-    } else {
-      axis_ = next_[1] <= next_[2] ? 1 : 2;
-    }
-    t_ = std::max(t_, next_[axis_]);
-    cell_[axis_] += ray_.direction[axis_] > 0.0 ? 1 : -1;
-    find_next(axis_);
-  }
-
- private:
-  void find_next(int axis) {
-    const double d = ray_.direction[axis];
-    const double plane = cell_[axis] + (d > 0.0 ? 1.0 : 0.0);
-    next_[axis] = d != 0.0 ? (plane - ray_.origin[axis]) * inverse_[axis] : kFar;
-  }
-
-  const Ray& ray_;
-  DVec3 inverse_;
-  IVec3 cell_;
-  double t_;
-  int axis_ = 0;
-  DVec3 next_{0.0};
-};
-
-// Cells that a ray passes by CellSteps before it goes on through the tree.
-constexpr int kSteps = 24;
-
 // A ray on its way through the cells that shapes touch.
 class ShapeRay {
  public:
-  ShapeRay(const TracedShapes& shapes, const VoxelRegistry& types, ShapeIndex::Reader& reader, const Ray& ray,
-           double max_t, ShapeParts parts)
-      : shapes_(shapes), types_(types), reader_(reader), ray_(ray), max_t_(max_t), parts_(parts) {
-    inverse_ = 1.0 / ray.direction;
-    room_ = kBetweenCells * std::min(std::min(std::abs(inverse_.x), std::abs(inverse_.y)), std::abs(inverse_.z));
+  ShapeRay(const VoxelRegistry& types, const Ray& ray, double max_t, ShapeParts parts)
+      : types_(types), ray_(ray), max_t_(max_t), parts_(parts), straight_(ray.origin, ray.direction) {
+    const DVec3 inverse = glm::abs(straight_.inverse());
+    room_ = kBetweenCells * std::min(std::min(inverse.x, inverse.y), inverse.z);
   }
 
   // Looks at the shapes of one cell. Returns true if there is a hit, which is then the nearest one.
-  bool meet_shapes(std::span<const PlacedShape> shapes, double t_enter, double t_exit) {
+  bool meet_shapes(const ShapesAtVoxel& here, double t_enter, double t_exit) {
     begin_ = t_enter - room_;
     end_ = std::min(t_exit + room_, max_t_);
-    for (const PlacedShape& shape : shapes) {
-      if (parts_ == ShapeParts::Opaque && types_[shape.type].visibility != Visibility::Opaque) continue;
+    for (const ListedShape& shape : here.listed()) {
+      if (parts_ == ShapeParts::Opaque && !shape.is_opaque) continue;
       if (parts_ == ShapeParts::Colliding && !types_[shape.type].collides) continue;
-      cross_shape(shape, ray_, inverse_, [&](const ShapeSpan& span) {
-        if (parts_ == ShapeParts::Visible) return take_visible(span);
-        if (parts_ != ShapeParts::Colliding || span.collides()) take_solid(span);
-      });
+      const auto take_part = [&](const ModelBox* box, const End& enter, const End& exit) {
+        if (parts_ == ShapeParts::Visible) return take_visible({here.voxel(), &shape, box}, enter, exit);
+        if (parts_ != ShapeParts::Colliding || box == nullptr || box->collides) {
+          take_solid({here.voxel(), &shape, box}, enter);
+        }
+      };
+      cross_shape(here, shape, ray_, straight_, std::max(begin_, 0.0), end_, take_part);
     }
     return found_;
   }
 
-  // Looks at all cells from `t_begin` on.
-  bool meet_cells(double t_begin = 0.0) {
-    const Ray rest{ray_.origin + t_begin * ray_.direction, ray_.direction};
-    visit_hits(shapes_.touched, rest, max_t_ - t_begin, [&](const VoxelSpan& span) {
-      return !meet_shapes(reader_.at(span.voxel), t_begin + span.t_enter, t_begin + span.t_exit);
-    });
-    return found_;
+  // Looks at all cells from where the walk is on. `walk`: through the voxels that shapes touch.
+  bool meet_cells(trace::Walk& walk, ShapeIndex::Reader& reader) {
+    while (walk.find(max_t_)) {
+      if (meet_cell(reader.at(walk.voxel()), walk)) return true;
+      if (!walk.is_within(max_t_)) return false;
+    }
+    return false;
   }
-  // As above, from the ray's origin. Faster if a shape is near.
-  bool meet_near_cells() {
-    const IBox bounds = shapes_.touched.bounds();
-    for (int axis = 0; axis < 3; ++axis) {
-      const double at = ray_.origin[axis];
-      if (!(at > bounds.min[axis] - kSteps && at < bounds.max[axis] + kSteps)) return meet_cells();
-    }
-    CellSteps steps(ray_, inverse_, voxel_of(ray_.origin), 0.0);
-    for (int i = 0; i < kSteps; ++i, steps.step()) {
-      if (steps.t() > max_t_) return false;
-      const std::span<const PlacedShape> here = reader_.at(steps.cell());
-      if (!here.empty() && meet_shapes(here, steps.t(), steps.t_exit())) return true;
-    }
-    return meet_cells(steps.t());
+  // Looks at the cell where the walk is, and leaves it.
+  bool meet_cell(const ShapesAtVoxel& here, trace::Walk& walk) {
+    const double t_enter = walk.t();
+    walk.leave_voxel();
+    return meet_shapes(here, t_enter, walk.t());
   }
 
   // Returns the inverse of the direction's components: infinite where they are 0.
-  [[nodiscard]] const DVec3& inverse() const { return inverse_; }
+  [[nodiscard]] const DVec3& inverse() const { return straight_.inverse(); }
 
   [[nodiscard]] ShapeHit hit() const {
-    const PlacedShape& shape = *best_.shape;
-    ShapeHit hit{std::max(best_t_, 0.0), shape.voxel, shape.model, Vec3(0.0F), shape.type, -1, Direction::PosX, false};
+    const ShapeModel& model = *best_.shape->model;
+    ShapeHit hit;
+    hit.t = std::max(best_end_.t, 0.0);
+    hit.voxel = best_.shape->voxel(best_.touched);
+    hit.model = &model;
+    hit.type = best_.shape->type;
+    hit.starts_inside = is_inside_;
+    hit.face = is_inside_ ? std::int16_t{-1} : best_end_.face;
     if (is_inside_) {
-      hit.starts_inside = true;
       hit.direction = nearest_direction(-ray_.direction);
       hit.normal = Vec3(normal_of(hit.direction));
       return hit;
     }
-    const ShapeSpan::End& end = is_exit_ ? best_.exit : best_.enter;
-    hit.face = end.face;
-    hit.normal = is_exit_ ? -best_.normal(end) : best_.normal(end);
+    // The common case first.
+    const bool is_straight = best_.box != nullptr && !best_.box->is_turned;
+    if (is_straight && !is_exit_ && hit.face >= 0) {
+      hit.direction = best_end_.side;
+      hit.normal = model.faces[static_cast<std::size_t>(hit.face)].normal;
+      return hit;
+    }
+    const Vec3 normal = ShapeSpan{{hit.voxel, hit.type, &model}, best_.box, {}, {}}.normal(best_end_);
+    hit.normal = is_exit_ ? -normal : normal;
     hit.direction = nearest_direction(DVec3(hit.normal));
     return hit;
   }
 
  private:
-  void take(const ShapeSpan& span, double t, bool is_exit, bool is_inside) {
-    if (found_ && !(t < best_t_)) return;
+  using End = ShapeSpan::End;
+  // A part of a shape. `touched`: the voxel in which the ray meets it. `box`: null for fluids.
+  struct Part {
+    IVec3 touched;
+    const ListedShape* shape;
+    const ModelBox* box;
+  };
+
+  void take(const Part& part, const End& end, double t, bool is_exit, bool is_inside) {
+    if (found_ && !(t < best_end_.t)) return;
     found_ = true;
-    best_ = span;
-    best_t_ = t;
+    best_ = part;
+    best_end_ = {t, end.face, end.side};
     is_exit_ = is_exit;
     is_inside_ = is_inside;
   }
   [[nodiscard]] bool is_in_cell(double t) const { return t >= begin_ && t <= end_; }
   // Returns true if the ray, up to `max_t`, meets a side here that is drawn and visible.
-  [[nodiscard]] bool is_visible(const ShapeSpan& span, const ShapeSpan::End& end) const {
+  [[nodiscard]] bool is_visible(const Part& part, const End& end) const {
     if (end.face < 0 || !(end.t >= 0.0) || !is_in_cell(end.t)) return false;
-    const PlacedShape& shape = *span.shape;
-    const DVec3 point = ray_.origin - DVec3(shape.voxel) + end.t * ray_.direction;
+    const ListedShape& shape = *part.shape;
+    if (shape.is_opaque) return true;
+    const DVec3 point = ray_.origin - DVec3(shape.voxel(part.touched)) + end.t * ray_.direction;
     return is_visible_at(types_[shape.type], *shape.model, shape.model->faces[static_cast<std::size_t>(end.face)],
                          point);
   }
-  // Both sides of a plate are at one place: the ray meets the side that it looks at.
-  static bool is_seen_from_inside(const ShapeSpan& span) { return span.enter.t < span.exit.t || span.enter.face < 0; }
-  void take_visible(const ShapeSpan& span) {
-    const bool is_opaque = types_[span.shape->type].visibility == Visibility::Opaque;
-    if (span.starts_inside() && is_opaque) {
-      if (is_in_cell(0.0)) take(span, 0.0, false, true);
-    } else if (is_visible(span, span.enter)) {
-      take(span, span.enter.t, false, false);
-    } else if (is_seen_from_inside(span) && is_visible(span, span.exit)) {
-      take(span, span.exit.t, true, false);
+  void take_visible(const Part& part, const End& enter, const End& exit) {
+    if (enter.t < 0.0 && part.shape->is_opaque) {
+      if (is_in_cell(0.0)) take(part, enter, 0.0, false, true);
+    } else if (is_visible(part, enter)) {
+      take(part, enter, enter.t, false, false);
+    } else if ((enter.t < exit.t || enter.face < 0) && is_visible(part, exit)) {
+      // Both sides of a plate are at one place: the ray meets the side that it looks at.
+      take(part, exit, exit.t, true, false);
     }
   }
-  void take_solid(const ShapeSpan& span) {
-    const double t = std::max(span.enter.t, 0.0);
-    if (is_in_cell(t)) take(span, t, false, span.starts_inside());
+  void take_solid(const Part& part, const End& enter) {
+    const double t = std::max(enter.t, 0.0);
+    if (is_in_cell(t)) take(part, enter, t, false, enter.t < 0.0);
   }
 
-  const TracedShapes& shapes_;
   const VoxelRegistry& types_;
-  ShapeIndex::Reader& reader_;
   const Ray& ray_;
   double max_t_;
   ShapeParts parts_;
+  BoxRay straight_;
   double room_;
-  DVec3 inverse_{0.0};  // of the direction; infinite where that is 0
   double begin_ = 0.0;
   double end_ = 0.0;
-  ShapeSpan best_;
-  double best_t_ = 0.0;
+  Part best_;
+  End best_end_;
   bool found_ = false;
   bool is_exit_ = false;
   bool is_inside_ = false;
@@ -311,7 +311,7 @@ class ShapeRay {
 }  // namespace
 
 Vec3 ShapeSpan::normal(const End& end) const {
-  if (end.face >= 0) return shape->model->faces[static_cast<std::size_t>(end.face)].normal;
+  if (end.face >= 0) return shape.model->faces[static_cast<std::size_t>(end.face)].normal;
   QUOIN_ASSERT(box != nullptr, "a free surface has a face");
   if (!box->is_turned) return Vec3(normal_of(end.side));
   const FaceFrame& frame = frame_of(end.side);
@@ -356,61 +356,230 @@ Rgba8 shape_texel(const ModelFace& face, const VoxelFace& look, const DVec3& poi
   return look.texture.level(0)[texel_number(uv[1], 1.0, size) * std::size_t{size} + texel_number(uv[0], 1.0, size)];
 }
 
-void visit_shape(const PlacedShape& shape, const Ray& ray_in_grid, FunctionRef<void(const ShapeSpan&)> visit) {
-  cross_shape(shape, ray_in_grid, 1.0 / ray_in_grid.direction, visit);
+void visit_shape(const ShapesAtVoxel& here, const ListedShape& shape, const Ray& ray_in_grid,
+                 FunctionRef<void(const ShapeSpan&)> visit) {
+  BoxRay straight(ray_in_grid.origin, ray_in_grid.direction);
+  const PlacedShape placed{shape.voxel(here.voxel()), shape.type, shape.model};
+  cross_shape(here, shape, ray_in_grid, straight, 0.0, kFar,
+              [&](const ModelBox* box, const ShapeSpan::End& enter, const ShapeSpan::End& exit) {
+                visit({placed, box, enter, exit});
+              });
 }
 
 bool first_shape(const TracedShapes& shapes, const VoxelRegistry& types, const Ray& ray_in_grid, double max_t,
                  ShapeParts parts, ShapeHit& hit) {
+  if (!trace::is_usable(ray_in_grid, max_t)) return false;
   ShapeIndex::Reader reader(shapes.index);
-  ShapeRay ray(shapes, types, reader, ray_in_grid, max_t, parts);
-  if (!ray.meet_cells()) return false;
+  trace::Walk walk(shapes.touched, ray_in_grid);
+  if (!walk.enter(shapes.touched.bounds(), max_t)) return false;
+  ShapeRay ray(types, ray_in_grid, max_t, parts);
+  if (!ray.meet_cells(walk, reader)) return false;
   hit = ray.hit();
   return true;
 }
 
 namespace {
 
-// The solids of a grid: opaque voxels and shapes. Both readers remember the last chunk.
-struct Solids {
-  Solids(const TracedShapes& of, const Grid& grid, const VoxelRegistry& registry)
-      : tree(of.solid), types(registry), voxels(grid), shapes(of.index) {}
-
-  const OccupancyTree& tree;
-  const VoxelRegistry& types;
-  GridReader voxels;
-  ShapeIndex::Reader shapes;
+// A voxel that a ray enters at `t` through a plane of `axis`; -1: it starts there. Without default values, so that
+// packets of them need not be cleared.
+struct Entry {
+  IVec3 voxel;
+  double t;
+  int axis;
 };
 
-// Finds the first solid after a ray's first cell. Returns true for a shape; else sets `next` to an opaque voxel, if
-// there is one.
-bool meet_solid_behind(ShapeRay& ray, Solids& solids, const Ray& in_grid, double max_t, CellSteps& steps,
-                       std::optional<RayHit>& next) {
-  bool is_met = false;
-  // Returns true if the ray ends in a cell.
-  const auto meet = [&](IVec3 cell, Direction face, double t_enter, double t_exit) {
-    if (solids.types.is_opaque(solids.voxels.get(cell))) {
-      next = RayHit{cell, face, t_enter, false};
-      return true;
-    }
-    const std::span<const PlacedShape> here = solids.shapes.at(cell);
-    is_met = !here.empty() && ray.meet_shapes(here, t_enter, t_exit);
-    return is_met;
-  };
-  for (int i = 0; i < kSteps; ++i) {
-    steps.step();
-    if (steps.t() > max_t) return false;
-    if (meet(steps.cell(), steps.face(), steps.t(), steps.t_exit())) return is_met;
+// The rays of a packet among the solids of a grid: opaque voxels and shapes. The rest of a ray that passes shapes
+// starts in the first voxel that no shape touches, so that the kernels for packets find its next solid. Neighbouring
+// rays share the last reads of lists and trees.
+class SolidRays {
+ public:
+  SolidRays(const TracedShapes& shapes, const Grid& voxels, const VoxelRegistry& types, const RayPacket& packet)
+      : types_(types),
+        voxels_(voxels),
+        packet_(&packet),
+        rest_(packet),
+        shapes_(shapes.index),
+        walk_(shapes.solid),
+        bounds_(shapes.solid.bounds()) {
+    rest_.active = 0;
   }
-  steps.step();
-  const double begin = steps.t();
-  if (begin > max_t) return false;
-  const Ray rest{in_grid.origin + begin * in_grid.direction, in_grid.direction};
-  visit_hits(solids.tree, rest, max_t - begin, [&](const VoxelSpan& span) {
-    const Direction face = span.starts_inside ? steps.face() : span.face;
-    return !meet(span.voxel, face, begin + span.t_enter, begin + span.t_exit);
-  });
-  return is_met;
+  void set_packet(const RayPacket& packet) {
+    packet_ = &packet;
+    rest_ = packet;
+    rest_.active = 0;
+  }
+
+  enum class Way : std::uint8_t { InShape, InCube, Ends, GoesOn };
+
+  // Follows a ray through the voxels that shapes touch, beginning with one of them and its shapes. If the ray goes on
+  // in another voxel, its rest starts there.
+  Way follow(int lane, const Entry& entry, ShapesAtVoxel here, ShapeRay& ray, const Ray& in_grid) {
+    const double max_t = max_t_of(lane);
+    walk_.set_ray(in_grid, ray.inverse());
+    walk_.begin(bounds_, entry.voxel, entry.t, entry.axis);
+    do {
+      if (is_opaque(here)) return Way::InCube;
+      if (ray.meet_cell(here, walk_)) return Way::InShape;
+      if (!walk_.is_within(max_t)) return Way::Ends;
+      here = shapes_at(walk_.voxel());
+    } while (!here.empty());
+    keep_rest(lane, in_grid, max_t);
+    return Way::GoesOn;
+  }
+  // Find the first solid on the rest of a ray, and on a ray from its origin on.
+  Way find_in_rest(int lane, ShapeRay& ray, const Ray& in_grid) {
+    const Entry& entry = entry_of(lane);
+    walk_.set_ray(in_grid, ray.inverse());
+    walk_.begin(bounds_, entry.voxel, entry.t, entry.axis);
+    return find(lane, ray);
+  }
+  Way find_from_origin(int lane, ShapeRay& ray, const Ray& in_grid) {
+    walk_.set_ray(in_grid, ray.inverse());
+    return walk_.enter(bounds_, max_t_of(lane)) ? find(lane, ray) : Way::Ends;
+  }
+
+  // Returns the shapes that touch a voxel. Neighbouring rays often ask for the same.
+  [[nodiscard]] const ShapesAtVoxel& shapes_at(IVec3 voxel) {
+    // By single numbers: a vector would be stored and loaded again, in parts of different size.
+    if (!is_known_ || voxel.x != known_at_[0] || voxel.y != known_at_[1] || voxel.z != known_at_[2]) {
+      known_ = shapes_.at(voxel);
+      known_at_[0] = voxel.x, known_at_[1] = voxel.y, known_at_[2] = voxel.z;
+      is_known_ = true;
+    }
+    return known_;
+  }
+  // Returns the opaque voxel that the last ray met.
+  [[nodiscard]] RayHit cube(const Ray& in_grid) const {
+    return {walk_.voxel(), trace::face_of(walk_, in_grid), walk_.t(), walk_.axis() < 0};
+  }
+  // The rests of the rays that go on, which are active.
+  [[nodiscard]] RayPacket& rest() { return rest_; }
+  // Returns the voxel in which the rest of a ray starts.
+  [[nodiscard]] const Entry& entry_of(int lane) const { return entries_[static_cast<std::size_t>(lane)]; }
+  // Returns the entry into a voxel that the rest of a ray hits, by the whole ray's distance.
+  [[nodiscard]] Entry entry_of(int lane, const RayHit& hit, const ShapeRay& ray, const Ray& in_grid) const {
+    if (hit.starts_inside) return entry_of(lane);
+    const int axis = frame_of(hit.face).axis;
+    const double plane = hit.voxel[axis] + (in_grid.direction[axis] > 0.0 ? 0.0 : 1.0);
+    return {hit.voxel, (plane - in_grid.origin[axis]) * ray.inverse()[axis], axis};
+  }
+
+ private:
+  // Requires: a solid voxel that shapes touch. A shape of another voxel may reach into an opaque one.
+  [[nodiscard]] bool is_opaque(const ShapesAtVoxel& here) const {
+    return !here.has_own() && types_.is_opaque(voxels_.get(here.voxel()));
+  }
+  [[nodiscard]] double max_t_of(int lane) const { return packet_->max_t[static_cast<std::size_t>(lane)]; }
+
+  Way find(int lane, ShapeRay& ray) {
+    const double max_t = max_t_of(lane);
+    while (walk_.find(max_t)) {
+      const ShapesAtVoxel here = shapes_at(walk_.voxel());
+      if (here.empty() || is_opaque(here)) return Way::InCube;
+      if (ray.meet_cell(here, walk_)) return Way::InShape;
+      if (!walk_.is_within(max_t)) break;
+    }
+    return Way::Ends;
+  }
+
+  void keep_rest(int lane, const Ray& in_grid, double max_t) {
+    const auto i = static_cast<std::size_t>(lane);
+    const IVec3 voxel = walk_.voxel();
+    entries_[i] = {voxel, walk_.t(), walk_.axis()};
+    // Within the voxel, for any rounding.
+    DVec3 at = in_grid.origin + walk_.t() * in_grid.direction;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double low = voxel[axis];
+      const double high = low + (1.0 - 0x1p-20);
+      if (axis == walk_.axis()) at[axis] = in_grid.direction[axis] > 0.0 ? low : high;
+      at[axis] = at[axis] < low ? low : at[axis] > high ? high : at[axis];
+    }
+    rest_.origin_x[i] = at.x, rest_.origin_y[i] = at.y, rest_.origin_z[i] = at.z;
+    rest_.max_t[i] = std::max(max_t - walk_.t(), 0.0);
+    rest_.active |= 1U << lane;
+  }
+
+  const VoxelRegistry& types_;
+  const Grid& voxels_;
+  const RayPacket* packet_;
+  RayPacket rest_;
+  RayPacket::Lanes<Entry> entries_;
+  ShapeIndex::Reader shapes_;
+  ShapesAtVoxel known_;
+  std::array<int, 3> known_at_{};
+  bool is_known_ = false;
+  trace::Walk walk_;
+  IBox bounds_;
+};
+
+// A kernel takes about the time in which single walks trace this many rays.
+constexpr int kFewRays = 3;
+
+// Takes the hits of a packet over from `SolidRays`.
+struct FoundSolids {
+  PacketHits& hits;
+  RayPacket::Lanes<ShapeHit>& in_shapes;
+  std::uint32_t in_shape = 0;
+
+  void take(int lane, SolidRays::Way way, const SolidRays& rays, const ShapeRay& ray, const Ray& in_grid) {
+    const std::uint32_t bit = 1U << lane;
+    hits.hit &= ~bit;
+    hits.starts_inside &= ~bit;
+    if (way == SolidRays::Way::InCube) hits.set(lane, rays.cube(in_grid));
+    if (way != SolidRays::Way::InShape) return;
+    const ShapeHit& hit = in_shapes[static_cast<std::size_t>(lane)] = ray.hit();
+    hits.set(lane, {hit.voxel, hit.direction, hit.t, hit.starts_inside});
+    in_shape |= bit;
+  }
+};
+
+// Finds the solids on the rests of rays.
+void find_rest(const TracedShapes& shapes, const VoxelRegistry& types, const RayPacket& packet, SolidRays& rays,
+               FoundSolids& found) {
+  while (rays.rest().active != 0) {
+    PacketHits next;
+    const bool are_few = std::popcount(rays.rest().active) < kFewRays;
+    next.hit = rays.rest().active;
+    if (!are_few) first_hits(shapes.solid, rays.rest(), next);
+    rays.rest().active = 0;
+    for (std::uint32_t left = next.hit; left != 0; left &= left - 1) {
+      const int lane = std::countr_zero(left);
+      const Ray in_grid = packet.ray(lane);
+      ShapeRay ray(types, in_grid, packet.max_t[static_cast<std::size_t>(lane)], ShapeParts::Visible);
+      if (are_few) {
+        found.take(lane, rays.find_in_rest(lane, ray, in_grid), rays, ray, in_grid);
+        continue;
+      }
+      const Entry entry = rays.entry_of(lane, next[lane], ray, in_grid);
+      const ShapesAtVoxel here = rays.shapes_at(entry.voxel);
+      if (here.empty()) {
+        const Direction face = side_of(entry.axis, in_grid.direction[entry.axis] < 0.0);
+        found.hits.set(lane, {entry.voxel, face, entry.t, false});
+      } else {
+        found.take(lane, rays.follow(lane, entry, here, ray, in_grid), rays, ray, in_grid);
+      }
+    }
+  }
+}
+
+// Finds the first solids of the rays whose first solid voxel, in `hits`, is touched by shapes.
+std::uint32_t first_of_touching(const TracedShapes& shapes, const Grid& voxels, const VoxelRegistry& types,
+                                const RayPacket& packet, std::uint32_t touching, PacketHits& hits,
+                                RayPacket::Lanes<ShapeHit>& in_shapes) {
+  SolidRays rays(shapes, voxels, types, packet);
+  FoundSolids found{hits, in_shapes};
+  for (; touching != 0; touching &= touching - 1) {
+    const int lane = std::countr_zero(touching);
+    const auto i = static_cast<std::size_t>(lane);
+    const Ray in_grid = packet.ray(lane);
+    ShapeRay ray(types, in_grid, packet.max_t[i], ShapeParts::Visible);
+    const bool starts_inside = (hits.starts_inside >> lane & 1U) != 0;
+    const IVec3 voxel{hits.x[i], hits.y[i], hits.z[i]};
+    const Entry entry{voxel, hits.t[i], starts_inside ? -1 : frame_of(hits.face[i]).axis};
+    found.take(lane, rays.follow(lane, entry, rays.shapes_at(voxel), ray, in_grid), rays, ray, in_grid);
+  }
+  find_rest(shapes, types, packet, rays, found);
+  return found.in_shape;
 }
 
 }  // namespace
@@ -418,52 +587,70 @@ bool meet_solid_behind(ShapeRay& ray, Solids& solids, const Ray& in_grid, double
 std::uint32_t first_solids(const TracedShapes& shapes, const Grid& voxels, const VoxelRegistry& types,
                            const RayPacket& rays_in_grid, PacketHits& hits, RayPacket::Lanes<ShapeHit>& in_shapes) {
   first_hits(shapes.solid, rays_in_grid, hits);
-  Solids solids(shapes, voxels, types);
-  std::uint32_t in_shape = 0;
+  ShapeIndex::Reader reader(shapes.index);
+  IVec3 last{0};
+  ShapesAtVoxel here;
+  std::uint32_t touching = 0;
   for (std::uint32_t left = hits.hit; left != 0; left &= left - 1) {
-    const int lane = std::countr_zero(left);
-    const auto i = static_cast<std::size_t>(lane);
-    const IVec3 cell{hits.x[i], hits.y[i], hits.z[i]};
-    const std::span<const PlacedShape> here = solids.shapes.at(cell);
-    if (here.empty()) continue;
-    // A shape of another voxel may reach into an opaque one.
-    if (here.front().voxel != cell && types.is_opaque(solids.voxels.get(cell))) continue;
-    const Ray in_grid = rays_in_grid.ray(lane);
-    const double max_t = rays_in_grid.max_t[i];
-    ShapeRay ray(shapes, types, solids.shapes, in_grid, max_t, ShapeParts::Visible);
-    CellSteps steps(in_grid, ray.inverse(), cell, hits.t[i]);
-    std::optional<RayHit> next;
-    if (ray.meet_shapes(here, hits.t[i], steps.t_exit()) ||
-        meet_solid_behind(ray, solids, in_grid, max_t, steps, next)) {
-      const ShapeHit& hit = in_shapes[i] = ray.hit();
-      next = RayHit{hit.voxel, hit.direction, hit.t, hit.starts_inside};
-      in_shape |= 1U << lane;
+    const auto i = static_cast<std::size_t>(std::countr_zero(left));
+    const bool is_last = left != hits.hit && hits.x[i] == last.x && hits.y[i] == last.y && hits.z[i] == last.z;
+    if (!is_last) {
+      last = {hits.x[i], hits.y[i], hits.z[i]};
+      here = reader.at(last);
     }
-    const std::uint32_t bit = 1U << lane;
-    hits.hit &= ~bit;
-    hits.starts_inside &= ~bit;
-    if (next) hits.set(lane, *next);
+    if (!here.empty()) touching |= 1U << i;
   }
-  return in_shape;
+  return touching == 0 ? 0 : first_of_touching(shapes, voxels, types, rays_in_grid, touching, hits, in_shapes);
 }
 
-// Most rays that miss both kinds of solids are done after one tree.
-void any_solids(const TracedShapes& shapes, const OccupancyTree& opaque, const VoxelRegistry& types,
+namespace {
+
+// Returns the rays of a packet, active in `rays`, that hit opaque voxels or visible parts of shapes. All hit voxels that
+// are opaque or that shapes touch.
+std::uint32_t blocked_rays(const TracedShapes& shapes, const OccupancyTree& opaque, const VoxelRegistry& types,
+                           const RayPacket& packet, std::uint32_t active, SolidRays& rays) {
+  using Way = SolidRays::Way;
+  RayPacket& rest = rays.rest();
+  rest.active = active;
+  std::uint32_t blocked = any_hits(opaque, rest);
+  rest.active = 0;
+  const auto take = [&](int lane, Way way) {
+    if (way == Way::InShape || way == Way::InCube) blocked |= 1U << lane;
+  };
+  for (std::uint32_t left = active & ~blocked; left != 0; left &= left - 1) {
+    const int lane = std::countr_zero(left);
+    const Ray in_grid = packet.ray(lane);
+    ShapeRay ray(types, in_grid, packet.max_t[static_cast<std::size_t>(lane)], ShapeParts::Visible);
+    const IVec3 voxel = voxel_of(in_grid.origin);
+    const ShapesAtVoxel here = rays.shapes_at(voxel);
+    take(lane, here.empty() ? rays.find_from_origin(lane, ray, in_grid)
+                            : rays.follow(lane, {voxel, 0.0, -1}, here, ray, in_grid));
+  }
+  if (std::popcount(rest.active) >= kFewRays) rest.active = any_hits(shapes.touched, rest);
+  for (std::uint32_t left = rest.active; left != 0; left &= left - 1) {
+    const int lane = std::countr_zero(left);
+    const Ray in_grid = packet.ray(lane);
+    ShapeRay ray(types, in_grid, packet.max_t[static_cast<std::size_t>(lane)], ShapeParts::Visible);
+    take(lane, rays.find_in_rest(lane, ray, in_grid));
+  }
+  return blocked;
+}
+
+}  // namespace
+
+// Most rays that miss both kinds of solids are done after one tree. Of the others, most hit opaque voxels.
+void any_solids(const TracedShapes& shapes, const OccupancyTree& opaque, const Grid& voxels, const VoxelRegistry& types,
                 std::span<const RayPacket> packets_in_grid, std::span<std::uint32_t> blocked) {
   any_hits(shapes.solid, packets_in_grid, blocked);
-  ShapeIndex::Reader reader(shapes.index);
-  for (std::size_t number = 0; number < packets_in_grid.size(); ++number) {
+  std::size_t number = 0;
+  while (number < packets_in_grid.size() && blocked[number] == 0) ++number;
+  if (number == packets_in_grid.size()) return;
+  SolidRays rays(shapes, voxels, types, packets_in_grid[number]);
+  for (const std::size_t first = number; number < packets_in_grid.size(); ++number) {
     if (blocked[number] == 0) continue;
     const RayPacket& packet = packets_in_grid[number];
-    RayPacket rays = packet;
-    rays.active = blocked[number];
-    blocked[number] = any_hits(opaque, rays);
-    for (std::uint32_t left = rays.active & ~blocked[number]; left != 0; left &= left - 1) {
-      const int lane = std::countr_zero(left);
-      const Ray in_grid = packet.ray(lane);
-      ShapeRay ray(shapes, types, reader, in_grid, packet.max_t[static_cast<std::size_t>(lane)], ShapeParts::Visible);
-      if (ray.meet_near_cells()) blocked[number] |= 1U << lane;
-    }
+    if (number != first) rays.set_packet(packet);
+    blocked[number] = blocked_rays(shapes, opaque, types, packet, blocked[number], rays);
   }
 }
 

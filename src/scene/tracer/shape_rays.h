@@ -28,7 +28,7 @@ struct ShapeSpan {
     Direction side = Direction::PosX;  ///< of the box, in its own space
   };
 
-  const PlacedShape* shape = nullptr;
+  PlacedShape shape;
   const ModelBox* box = nullptr;  ///< null for fluids
   End enter;                      ///< negative t: the ray starts inside
   End exit;
@@ -40,9 +40,11 @@ struct ShapeSpan {
   [[nodiscard]] Vec3 normal(const End& end) const;
 };
 
-/// Finds the ways of a ray through the boxes of a shape: all that end at or after t = 0, in the order of the boxes. A
-/// ray that only touches an edge meets nothing. Precision: double, relative to the shape's voxel.
-void visit_shape(const PlacedShape& shape, const Ray& ray_in_grid, FunctionRef<void(const ShapeSpan&)> visit);
+/// Finds the ways of a ray through the boxes of one of the shapes that touch a voxel: all that end at or after t = 0,
+/// in the order of the boxes. A ray that only touches an edge meets nothing. Precision: double, relative to the shape's
+/// voxel.
+void visit_shape(const ShapesAtVoxel& here, const ListedShape& shape, const Ray& ray_in_grid,
+                 FunctionRef<void(const ShapeSpan&)> visit);
 
 /// A surface of a shape that a ray meets, in the space of its grid. Without default values, so that packets of them
 /// need not be cleared.
@@ -88,8 +90,8 @@ bool first_shape(const TracedShapes& shapes, const VoxelRegistry& types, const R
 std::uint32_t first_solids(const TracedShapes& shapes, const Grid& voxels, const VoxelRegistry& types,
                            const RayPacket& rays_in_grid, PacketHits& hits, RayPacket::Lanes<ShapeHit>& in_shapes);
 /// Sets `blocked[i]` to the rays of packet i that hit opaque voxels or visible parts of shapes. `opaque`: the tree of
-/// the grid's opaque voxels. Requires: as many elements in `blocked` as packets.
-void any_solids(const TracedShapes& shapes, const OccupancyTree& opaque, const VoxelRegistry& types,
+/// the opaque voxels of `voxels`. Requires: as many elements in `blocked` as packets.
+void any_solids(const TracedShapes& shapes, const OccupancyTree& opaque, const Grid& voxels, const VoxelRegistry& types,
                 std::span<const RayPacket> packets_in_grid, std::span<std::uint32_t> blocked);
 
 }  // namespace quoin

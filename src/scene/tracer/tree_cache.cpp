@@ -69,10 +69,10 @@ std::uint64_t glass_row(const TracedShapes& shapes, IVec3 first) {
   std::uint64_t row = 0;
   for (std::uint64_t left = shapes.index.touched_row(first); left != 0; left &= left - 1) {
     const int x = std::countr_zero(left);
-    const auto is_glass = [&](const PlacedShape& shape) {
+    const auto is_glass = [&](const ListedShape& shape) {
       return shape.type < shapes.is_glass.size() && shapes.is_glass[shape.type] != 0;
     };
-    if (std::ranges::any_of(shapes.index.at(first + IVec3(x, 0, 0)), is_glass)) row |= std::uint64_t{1} << x;
+    if (std::ranges::any_of(shapes.index.at(first + IVec3(x, 0, 0)).listed(), is_glass)) row |= std::uint64_t{1} << x;
   }
   return row;
 }
