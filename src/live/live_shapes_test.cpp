@@ -36,6 +36,18 @@ VoxelFaces faces_of_furnace(bool has_door) {
   return VoxelFaces({has_door ? door : side, side, side, side, side, side});
 }
 
+/// A shape whose side is covered if its neighbour on the opposite side connects: a change reaches two voxels.
+VoxelShapes bridge() {
+  ShapeRules rules{.parts = {{.shape = VoxelShape::box({6, 6, 6}, {10, 10, 10})}},
+                   .neighbours = ShapeNeighbours::Connected};
+  const VoxelShape half = VoxelShape::box({8, 0, 0}, {16, 16, 16});
+  for (const auto& [axis, turns] : {std::pair{1, 0}, {1, 1}, {1, 2}, {1, 3}, {2, 1}, {2, 3}}) {
+    const AxisOrientation turn = AxisOrientation::quarter_turns(axis, turns);
+    rules.parts.push_back({.shape = half, .orientation = turn, .when = {{.connected = {turn.apply(Direction::NegX)}}}});
+  }
+  return *VoxelShapes::from_rules(std::move(rules));
+}
+
 /// A floor and random voxels with shapes around the corner of eight chunks.
 class ShapedWorld {
  public:
@@ -44,6 +56,11 @@ class ShapedWorld {
     furnace.faces = faces_of_furnace(true);
     furnace.orientations = StateOrientations::about_y();
     furnace_ = scene.types.add(furnace).value();
+    VoxelProperties stairs{.name = "stairs with corners", .state_bits = 3};
+    stairs.orientations = StateOrientations::about_y_and_upside_down();
+    stairs.shapes = shapes_for_tests::stairs();
+    scene.types.add(stairs).value();
+    scene.types.add({.name = "bridge", .shapes = bridge()}).value();
     SceneGrid entry;
     entry.grid.fill_box({{-20, -7, -20}, {20, -3, 20}}, types_.stone);
     handle = scene.add_grid(std::move(entry));
@@ -294,6 +311,45 @@ TEST(LiveShapes, EditsReachFartherThanOneVoxel) {
     world.edit_voxels();
   }
   EXPECT_GT(stale, 3);
+}
+
+// The end of an arm that reaches out of its chunk has the light of a voxel two away from the chunk.
+TEST(LiveShapes, FollowLightTwoVoxelsAway) {
+  Scene scene;
+  EXPECT_TRUE(scene.types.add({.name = "stone"}));
+  EXPECT_TRUE(scene.types.add({.name = "lamp", .colour = {255, 255, 255}, .emission = 1.0F}));
+  ShapeElement arm{.min = {-16, 2, 2}, .max = {4, 14, 14}};
+  EXPECT_TRUE(scene.types.add({.name = "arm", .shapes = VoxelShape::from_elements({arm}).value()}));
+  SceneGrid entry;
+  entry.grid.fill_box({{-30, 0, 0}, {10, 12, 12}}, 1);
+  entry.grid.fill_box({{-29, 1, 1}, {9, 11, 11}}, kAir);
+  entry.grid.set({0, 5, 5}, 3);
+  entry.grid.set({-16, 5, 5}, 2);  // 14 voxels away from (-2, 5, 5), where the last of its light is
+  const GridHandle handle = scene.add_grid(std::move(entry));
+  scene.add_instance({"", handle});
+  SceneLight light;
+  LiveMeshes meshes;
+  meshes.use_light(&light);
+  std::uint32_t with_lamp = 0;
+  for (const bool has_lamp : {true, false}) {
+    if (!has_lamp) scene.edit(handle).grid.set({-16, 5, 5}, kAir);
+    light.update(scene, {1});
+    meshes.finish(scene, {});
+    std::uint32_t brightest = 0;
+    bool is_given = false;
+    for (const SurfaceUpdate& update : meshes.take()) {
+      for (const FaceLight& corners : update.surface->shape_light) {
+        is_given = true;
+        for (const std::uint32_t corner : corners) brightest = std::max(brightest, corner);
+      }
+    }
+    EXPECT_TRUE(is_given);
+    if (has_lamp) with_lamp = brightest;
+    if (!has_lamp) {
+      EXPECT_EQ(brightest, 0U);
+    }
+  }
+  EXPECT_GT(with_lamp, 0U);
 }
 
 // The light of a face in the open is that of the voxels around it, as the corners of quads have it.

@@ -77,6 +77,7 @@ class SurfaceLight {
   /// Replaces `corners` with the light at the corners of faces of shapes, in the order of ModelFace::corners: that of
   /// `read`, rounded to twelfths of a level. `chunk`: the chunk of the faces.
   /// Reads: voxels up to 3 away from a face's own; up to 2 if its shape stays within its voxel.
+  /// Cost:  0.1 microseconds per corner near changing light, less where light is even.
   void read(std::span<const ShapeFace> faces, IVec3 chunk, BlockVector<FaceLight>& corners);
 
  private:

@@ -2,7 +2,7 @@
 #include <quoin/render/surface_light.h>
 
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <optional>
 
 #include <quoin/core/assert.h>
@@ -33,57 +33,87 @@ FaceLight SurfaceLight::face(IVec3 voxel, Direction direction) {
 
 namespace {
 
-// Returns the light of a voxel if light passes it, and all of its 26 neighbours that light passes have the same.
-std::optional<std::uint16_t> even_light_around(LightRows& voxels, IVec3 voxel) {
-  if (!voxels.passes(voxel)) return std::nullopt;
-  const std::uint16_t word = voxels.word(voxel);
-  for (int i = 0; i < 9; ++i) {
-    const IVec3 first = voxel + IVec3(-1, i % 3 - 1, i / 3 - 1);
-    for (int x = 0; x < 3;) {
-      const LightRows::Row& row = voxels.row_of(first + IVec3(x, 0, 0));
-      auto at = static_cast<std::size_t>((first.x + x) & (kChunkEdge - 1));
-      for (; x < 3 && at < kChunkEdge; ++x, ++at) {
-        if ((row.passing >> at & 1U) != 0 && row.words[at] != word) return std::nullopt;
+// The light of the voxels around a voxel, by positions relative to it: -1 to 2 on each axis.
+class NearLight {
+ public:
+  NearLight(LightRows& rows, IVec3 voxel) {
+    for (int i = 0; i < 16; ++i) {
+      const IVec3 first = voxel + IVec3(-1, i % 4 - 1, i / 4 - 1);
+      for (int x = 0; x < 4;) {
+        const LightRows::Row& row = rows.row_of(first + IVec3(x, 0, 0));
+        auto at = static_cast<std::size_t>((first.x + x) & (kChunkEdge - 1));
+        for (; x < 4 && at < kChunkEdge; ++x, ++at) {
+          const auto number = static_cast<std::size_t>(4 * i + x);
+          words_[number] = row.words[at];
+          passing_ |= (row.passing >> at & 1U) << number;
+        }
       }
     }
   }
-  return word;
-}
 
-// Returns the light of a face's corner: half a voxel in front of it.
-class ShapeCorners {
- public:
-  ShapeCorners(LightRows& voxels, IVec3 voxel, const ShapeModel& model) : voxels_(voxels), voxel_(voxel) {
-    if (model.cells == IBox{IVec3(0), IVec3(1)}) even_ = even_light_around(voxels, voxel);
-  }
-
-  [[nodiscard]] std::uint32_t light(const Vec3& corner, const Vec3& normal) const {
-    if (even_ && reads_even(corner, normal)) return 12 * level_bytes(*even_);
-    // Samples are at the centres of voxels.
-    const DVec3 point = DVec3(voxel_) - 0.5 + DVec3(corner);
-    const MeanLevels levels = light_before(voxels_, point, normal, 1);
-    const auto part = [](float level) { return static_cast<std::uint32_t>(std::lround(12.0F * level)); };
-    return part(levels.sky) | part(levels.red) << 8 | part(levels.green) << 16 | part(levels.blue) << 24;
+  [[nodiscard]] bool passes(IVec3 at) const { return (passing_ >> number_of(at) & 1U) != 0; }
+  [[nodiscard]] std::uint16_t word(IVec3 at) const { return words_[number_of(at)]; }
+  // Returns the light of those of eight voxels, from `low` on, that light passes, if there are any and they have the
+  // same. It is then that of all points between them.
+  [[nodiscard]] std::optional<std::uint16_t> common(IVec3 low) const {
+    std::optional<std::uint16_t> found;
+    for (std::size_t i = 0; i < 8; ++i) {
+      const std::size_t number = number_of(low) + (i & 1U) + 4 * (i >> 1U & 1U) + 16 * (i >> 2U);
+      if ((passing_ >> number & 1U) == 0) continue;
+      if (found && *found != words_[number]) return std::nullopt;
+      found = words_[number];
+    }
+    return found;
   }
 
  private:
-  // Returns true if the light in front is that of the voxel and its neighbours: some of them count, and no other voxel.
-  [[nodiscard]] bool reads_even(const Vec3& corner, const Vec3& normal) const {
-    for (int axis = 0; axis < 3; ++axis) {
-      const float at = corner[axis] - 0.5F + 0.5F * normal[axis];
-      if (at < -1.0F || at > 1.0F) return false;
-      if (at < 1.0F) continue;
-      // The voxel itself is none of the eight around the point: the next one is the nearest.
-      IVec3 next = voxel_;
-      ++next[axis];
-      if (!voxels_.passes(next)) return false;
-    }
-    return true;
+  static std::size_t number_of(IVec3 at) {
+    QUOIN_ASSERT(at.x >= -1 && at.x <= 2 && at.y >= -1 && at.y <= 2 && at.z >= -1 && at.z <= 2, "a voxel around");
+    return static_cast<std::size_t>(at.x + 1 + 4 * (at.y + 1) + 16 * (at.z + 1));
   }
 
-  LightRows& voxels_;
-  IVec3 voxel_;
-  std::optional<std::uint16_t> even_;
+  std::uint64_t passing_ = 0;  // bit x + 4 y + 16 z, counted from the lowest voxel
+  std::array<std::uint16_t, 64> words_;
+};
+
+// The same for shapes that reach outside their voxel.
+struct FarLight {
+  LightRows& rows;
+  IVec3 voxel;
+
+  [[nodiscard]] bool passes(IVec3 at) const { return rows.passes(voxel + at); }
+  [[nodiscard]] std::uint16_t word(IVec3 at) const { return rows.word(voxel + at); }
+};
+
+// The light at corners of the faces of a voxel: half a voxel in front of them.
+class ShapeCorners {
+ public:
+  ShapeCorners(LightRows& rows, IVec3 voxel, const ShapeModel& model) : far_{rows, voxel} {
+    if (model.cells == IBox{IVec3(0), IVec3(1)}) near_.emplace(rows, voxel);
+  }
+
+  [[nodiscard]] std::uint32_t light(const Vec3& corner, const Vec3& normal) const {
+    const DVec3 point = DVec3(corner) - 0.5;  // samples are at the centres of voxels
+    const DVec3 front = point + 0.5 * DVec3(normal);
+    IVec3 low(0);
+    bool is_near = near_.has_value();
+    for (int axis = 0; axis < 3; ++axis) {
+      is_near = is_near && front[axis] >= -1.0 && front[axis] <= 1.0;
+      low[axis] = front[axis] < 0.0 ? -1 : front[axis] < 1.0 ? 0 : 1;
+    }
+    if (!is_near) return twelfths(light_before(far_, point, normal, 1));
+    if (const auto word = near_->common(low)) return 12 * level_bytes(*word);
+    return twelfths(light_before(*near_, point, normal, 1));
+  }
+
+ private:
+  static std::uint32_t twelfths(const MeanLevels& levels) {
+    const auto part = [](float level) { return static_cast<std::uint32_t>(12.0F * level + 0.5F); };
+    return part(levels.sky) | part(levels.red) << 8 | part(levels.green) << 16 | part(levels.blue) << 24;
+  }
+
+  FarLight far_;
+  std::optional<NearLight> near_;
 };
 
 }  // namespace
