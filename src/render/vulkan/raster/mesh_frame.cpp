@@ -297,7 +297,7 @@ bool is_flat(const Camera& camera) {
 
 SolidFaces SolidFaces::of(const VoxelRegistry& types) {
   SolidFaces solid;
-  for (std::size_t i = 0; i < types.size(); ++i) {
+  for (std::size_t i = 0; types.has_textures() && i < types.size(); ++i) {
     const VoxelProperties& type = types[static_cast<VoxelType>(i)];
     if (type.visibility != Visibility::Transparent) continue;
     std::uint8_t faces = 0;

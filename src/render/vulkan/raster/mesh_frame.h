@@ -94,7 +94,7 @@ struct SolidFaces {
     return type < by_type.size() && (by_type[type] >> face & 1U) != 0;
   }
   [[nodiscard]] bool contains(const Quad& quad) const {
-    if (!has_any) return false;
+    if (quad.type() >= by_type.size() || by_type[quad.type()] == 0) return false;
     return contains(quad.type(), static_cast<std::size_t>(quad.orientation().inverse().apply(quad.direction())));
   }
 };

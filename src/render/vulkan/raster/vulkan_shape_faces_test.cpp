@@ -1,4 +1,5 @@
-// Rasterised images show shapes of voxel types, cubes that their state turns, and cutout and translucent texels.
+// Rasterised images show shapes of voxel types, cubes that their state turns, and cutout and translucent texels. Most of
+// the processor time is that of compiling pipelines, so tests that need further ones run nightly.
 
 #include <array>
 #include <memory>
@@ -9,6 +10,7 @@
 
 #include <glm/gtc/quaternion.hpp>
 
+#include "core/work/nightly_for_tests.h"
 #include "grid/shapes/shape_types_for_tests.h"
 #include "render/vulkan/march/renderer_impl.h"
 #include "render/vulkan/raster/mesh_for_tests.h"
@@ -52,7 +54,7 @@ VoxelProperties seen_through(std::string name, const VoxelFaces& faces) {
   return type;
 }
 
-class VulkanMeshShapes : public vulkan_test::VulkanMeshTest {};
+class VulkanShapeFaces : public vulkan_test::VulkanMeshTest {};
 
 /// Ground with shapes of opaque types on it, in two chunks.
 struct Yard {
@@ -112,7 +114,7 @@ struct Yard {
   }
 };
 
-TEST_F(VulkanMeshShapes, FacesOfShapesMatchCpu) {
+TEST_F(VulkanShapeFaces, FacesOfShapesMatchCpu) {
   Yard yard;
   yard.add_turned({-3.0, 9.5, 2.0});
   compare(yard.scene, towards({9, 8, 14}, {0, 1, 0}), plain(240, 180), "shapes_near");
@@ -122,7 +124,8 @@ TEST_F(VulkanMeshShapes, FacesOfShapesMatchCpu) {
 }
 
 // A roof of cubes casts its shadow on slabs. Lamps are above it.
-TEST_F(VulkanMeshShapes, ShadowsOnShapesMatchCpu) {
+TEST_F(VulkanShapeFaces, ShadowsOnShapesMatchCpu) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
   Scene scene;
   const ShapeTypes types(scene.types);
   Grid grid;
@@ -135,7 +138,7 @@ TEST_F(VulkanMeshShapes, ShadowsOnShapesMatchCpu) {
   compare(scene, towards({9, 9, 12}, {0, 0, 0}), options, "shadows");
 }
 
-TEST_F(VulkanMeshShapes, CubesTurnedByStateMatchCpu) {
+TEST_F(VulkanShapeFaces, CubesTurnedByStateMatchCpu) {
   Scene scene;
   VoxelProperties furnace{.name = "furnace", .state_bits = 6};
   furnace.faces = random_faces(3);
@@ -151,7 +154,7 @@ TEST_F(VulkanMeshShapes, CubesTurnedByStateMatchCpu) {
   compare(scene, towards({-9, -7, -13}, {6, 1, 2}), without_shadows(sized(200, 150)), "turned_back");
 }
 
-TEST_F(VulkanMeshShapes, CutoutTexelsMatchCpu) {
+TEST_F(VulkanShapeFaces, CutoutTexelsMatchCpu) {
   Scene scene;
   const VoxelType stone = add_type(scene, {150, 140, 130});
   const VoxelType leaves =
@@ -165,6 +168,9 @@ TEST_F(VulkanMeshShapes, CutoutTexelsMatchCpu) {
   RenderOptions options = plain(200, 150);
   compare(scene, towards({7, 5, 9}, {0, 1, 0}), options, "cutout_near");
   compare(scene, towards({-50, 30, -45}, {0, 1, 0}, 0.2), options, "cutout_distant");
+  if (!is_nightly()) return;
+  options.light.shading = Shading::Normals;
+  compare(scene, towards({7, 5, 9}, {0, 1, 0}), options, "cutout_normals");
 }
 
 // Looks towards -Z; every ray passes straight through a pane.
@@ -177,7 +183,8 @@ Camera straight(DVec3 position, double view_height) {
 }
 
 // Panes of translucent texels, cubes and shapes, before a wall; each counts as a voxel of glass.
-TEST_F(VulkanMeshShapes, TranslucentFacesMatchCpu) {
+TEST_F(VulkanShapeFaces, TranslucentFacesMatchCpu) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
   Scene scene;
   const ShapeTypes types(scene.types);
   const VoxelFace stained{.texture = holed_texture(16, 4, FaceAlpha::Translucent), .alpha = FaceAlpha::Translucent};
@@ -199,7 +206,7 @@ TEST_F(VulkanMeshShapes, TranslucentFacesMatchCpu) {
   expect_like(drawn(camera, meshes), render_test::taken(scene, camera, options), "translucent");
 }
 
-TEST_F(VulkanMeshShapes, CutoutPlatesAreSeenFromBothSides) {
+TEST_F(VulkanShapeFaces, CutoutPlatesAreSeenFromBothSides) {
   Scene scene;
   const ShapeTypes types(scene.types);
   VoxelProperties plant = seen_through("plant", VoxelFace{.texture = holed_texture(16, 9), .alpha = FaceAlpha::Cutout});
@@ -227,7 +234,7 @@ TEST_F(VulkanMeshShapes, CutoutPlatesAreSeenFromBothSides) {
 }
 
 // Texture and tint of a type's faces are those of its last update, without new meshes.
-TEST_F(VulkanMeshShapes, EditsMatchCpu) {
+TEST_F(VulkanShapeFaces, EditsMatchCpu) {
   Yard yard;
   const Camera camera = towards({9, 8, 14}, {0, 1, 0});
   const RenderOptions options = vulkan_test::of_day(plain(160, 120));
@@ -247,7 +254,8 @@ TEST_F(VulkanMeshShapes, EditsMatchCpu) {
   expect_like(drawn(camera, mesh_options(options)), render_test::taken(yard.scene, camera, options), "edited_voxels");
 }
 
-TEST_F(VulkanMeshShapes, NormalsMatchCpu) {
+TEST_F(VulkanShapeFaces, NormalsMatchCpu) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
   Yard yard;
   yard.add_turned({-3.0, 9.5, 2.0});
   RenderOptions options = plain(120, 90);
@@ -255,8 +263,26 @@ TEST_F(VulkanMeshShapes, NormalsMatchCpu) {
   compare(yard.scene, towards({9, 8, 14}, {0, 1, 0}), options, "normals");
 }
 
+TEST_F(VulkanShapeFaces, DrawsEdgesOfShapes) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
+  Scene scene;
+  const ShapeTypes types(scene.types);
+  Grid grid;
+  grid.set({0, 0, 0}, types.stairs);
+  place(scene, std::move(grid));
+  put(scene, vulkan_test::blocky_surfaces(scene));
+  MeshImageOptions options = mesh_options(plain(64, 64));
+  const Camera camera = towards({2, 2, 3}, {0.5, 0.5, 0.5});
+  const Image filled = drawn(camera, options);
+  options.wireframe = Wireframe::Over;
+  const Image over = drawn(camera, options);
+  EXPECT_GT(vulkan_test::bytes_that_differ(over, filled, 20), 300);
+  options.wireframe = Wireframe::Only;
+  EXPECT_GT(vulkan_test::bytes_that_differ(drawn(camera, options), over, 20), 300);
+}
+
 // A cube as a shape has the light and the occlusion of a cube.
-TEST_F(VulkanMeshShapes, CubeAsShapeIsLitLikeCube) {
+TEST_F(VulkanShapeFaces, CubeAsShapeIsLitLikeCube) {
   const auto image = [&](bool is_shape, const LightOptions& light) {
     Scene scene;
     const VoxelType stone = add_type(scene, {150, 140, 130});
@@ -280,11 +306,12 @@ TEST_F(VulkanMeshShapes, CubeAsShapeIsLitLikeCube) {
   light.shadows = false;
   const int bytes = static_cast<int>(image(false, light).rgb.size());
   EXPECT_LT(vulkan_test::bytes_that_differ(image(true, light), image(false, light), 2), bytes / 200);
+  if (!is_nightly()) return;
   light.shading = Shading::Occlusion;
   EXPECT_LT(vulkan_test::bytes_that_differ(image(true, light), image(false, light), 2), bytes / 200);
 }
 
-TEST_F(VulkanMeshShapes, StoresFacesCompactly) {
+TEST_F(VulkanShapeFaces, StoresFacesCompactly) {
   Yard yard;
   put(yard.scene, vulkan_test::blocky_surfaces(yard.scene));
   const std::size_t textures = renderer_->impl().texels.size();
@@ -305,7 +332,7 @@ TEST_F(VulkanMeshShapes, StoresFacesCompactly) {
   EXPECT_EQ(renderer_->impl().texels.size(), textures);
 }
 
-TEST_F(VulkanMeshShapes, RefusesFacesOutOfRange) {
+TEST_F(VulkanShapeFaces, RefusesFacesOutOfRange) {
   Yard yard;
   put(yard.scene, {});
   const auto put_changed = [&](const auto& change) {
