@@ -361,22 +361,25 @@ TEST(DeviceTextures, TakesMemoryOfTexels) {
 }
 
 // Shapes in two distant chunks, textured and with glass.
-Scene scene_with_shapes(const ShapeTypes& types, Scene scene) {
-  VoxelProperties slab = textured(grey(16, 20));
-  slab.shapes = VoxelShape::box({0, 0, 0}, {16, 8, 16});
-  const VoxelType type = *scene.types.add(slab);
-  Grid grid;
-  grid.fill_box({{0, 0, 0}, {3, 1, 3}}, type);
-  grid.fill_box({{0, 1, 0}, {3, 2, 1}}, types.pane);
-  grid.fill_box({{300, 0, 0}, {303, 1, 1}}, types.fence);
-  render_test::place(scene, std::move(grid));
-  return scene;
-}
+struct ShapedScene {
+  Scene scene;
+  ShapeTypes types{scene.types};
+
+  ShapedScene() {
+    VoxelProperties slab = textured(grey(16, 20));
+    slab.shapes = VoxelShape::box({0, 0, 0}, {16, 8, 16});
+    const VoxelType type = scene.types.add(slab).value();
+    Grid grid;
+    grid.fill_box({{0, 0, 0}, {3, 1, 3}}, type);
+    grid.fill_box({{0, 1, 0}, {3, 2, 1}}, types.pane);
+    grid.fill_box({{300, 0, 0}, {303, 1, 1}}, types.fence);
+    render_test::place(scene, std::move(grid));
+  }
+};
 
 TEST(DeviceScene, IsEmptyAfterFailedUpdateOfShapes) {
-  Scene types_only;
-  const ShapeTypes types(types_only.types);
-  const Scene scene = scene_with_shapes(types, types_only);
+  const ShapedScene shaped;
+  const Scene& scene = shaped.scene;
   int allocations = 0;
   for (const bool throws : {false, true}) {
     for (int successes = 0;; ++successes) {
@@ -387,7 +390,7 @@ TEST(DeviceScene, IsEmptyAfterFailedUpdateOfShapes) {
       vulkan::DeviceScene device(memory, known);
       Status done;
       try {
-        done = device.update(scene, InstanceFilter::Visible, 1);
+        done = device.update(scene, InstanceFilter::Visible, {});
       } catch (const std::bad_alloc&) {
         done = make_error(ErrorCode::LimitExceeded, "thrown");
       }
@@ -400,7 +403,7 @@ TEST(DeviceScene, IsEmptyAfterFailedUpdateOfShapes) {
       EXPECT_EQ(memory.queued, 0) << successes;
       EXPECT_TRUE(known.empty());
       memory.left = -1;
-      ASSERT_TRUE(device.update(scene, InstanceFilter::Visible, 1));
+      ASSERT_TRUE(device.update(scene, InstanceFilter::Visible, {}));
       EXPECT_TRUE(device.placement().has_shapes);
       EXPECT_TRUE(device.placement().has_transparent);
     }
@@ -409,29 +412,28 @@ TEST(DeviceScene, IsEmptyAfterFailedUpdateOfShapes) {
 }
 
 TEST(DeviceScene, SendsShapesOfChangedChunks) {
-  Scene types_only;
-  const ShapeTypes types(types_only.types);
-  Scene scene = scene_with_shapes(types, types_only);
+  ShapedScene shaped;
+  Scene& scene = shaped.scene;
   QueuedMemory memory;
   vulkan::KnownTexels known;
   vulkan::DeviceScene device(memory, known);
-  ASSERT_TRUE(device.update(scene, InstanceFilter::Visible, 1));
+  ASSERT_TRUE(device.update(scene, InstanceFilter::Visible, {}));
   const int all = memory.flushed;
   EXPECT_EQ(known.size(), 1U);
-  ASSERT_TRUE(device.update(scene, InstanceFilter::Visible, 1));
+  ASSERT_TRUE(device.update(scene, InstanceFilter::Visible, {}));
   EXPECT_EQ(memory.flushed, 0);
   const GridHandle grid = scene.grids().handles().front();
   ASSERT_TRUE(scene.edit(grid).grid.set_data({301, 0, 0}, {.state = 1}));
-  ASSERT_TRUE(device.update(scene, InstanceFilter::Visible, 1));
+  ASSERT_TRUE(device.update(scene, InstanceFilter::Visible, {}));
   EXPECT_GT(memory.flushed, 0);
   EXPECT_LT(memory.flushed, all / 2);
-  scene.edit(grid).grid.fill_box({{0, 0, 0}, {303, 2, 3}}, types.stone);
-  ASSERT_TRUE(device.update(scene, InstanceFilter::Visible, 1));
+  scene.edit(grid).grid.fill_box({{0, 0, 0}, {303, 2, 3}}, shaped.types.stone);
+  ASSERT_TRUE(device.update(scene, InstanceFilter::Visible, {}));
   EXPECT_FALSE(device.placement().has_shapes);
   EXPECT_FALSE(device.placement().has_transparent);
   // Scenes for other shaders show cubes.
   vulkan::DeviceScene cubes(memory);
-  ASSERT_TRUE(cubes.update(scene_with_shapes(types, types_only), InstanceFilter::Visible, 1));
+  ASSERT_TRUE(cubes.update(ShapedScene().scene, InstanceFilter::Visible, {}));
   EXPECT_FALSE(cubes.placement().has_shapes);
   EXPECT_TRUE(cubes.placement().has_transparent);
 }
