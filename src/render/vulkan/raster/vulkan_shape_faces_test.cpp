@@ -30,7 +30,7 @@ using vulkan_test::with_mesh_light;
 using vulkan_test::without_shadows;
 
 // Returns light without shadows and occlusion: a mesh also darkens corners inside of voxels, and by shapes.
-RenderOptions plain(int width, int height) {
+RenderOptions plain_light(int width, int height) {
   RenderOptions options = without_shadows(sized(width, height));
   options.light.occlusion_mode = OcclusionMode::Off;
   return options;
@@ -117,10 +117,10 @@ struct Yard {
 TEST_F(VulkanShapeFaces, FacesOfShapesMatchCpu) {
   Yard yard;
   yard.add_turned({-3.0, 9.5, 2.0});
-  compare(yard.scene, towards({9, 8, 14}, {0, 1, 0}), plain(240, 180), "shapes_near");
-  compare(yard.scene, towards({-6, 1.6, 4}, {2, 0.5, -3}), plain(160, 120), "shapes_eye_height");
-  compare(yard.scene, towards({60, 40, 90}, {0, 1, 0}, 0.3), plain(160, 120), "shapes_distant");
-  compare(yard.scene, from_above(0.31, 30, -0.43, 15.7), plain(160, 120), "shapes_flat");
+  compare(yard.scene, towards({9, 8, 14}, {0, 1, 0}), plain_light(240, 180), "shapes_near");
+  compare(yard.scene, towards({-6, 1.6, 4}, {2, 0.5, -3}), plain_light(160, 120), "shapes_eye_height");
+  compare(yard.scene, towards({60, 40, 90}, {0, 1, 0}, 0.3), plain_light(160, 120), "shapes_distant");
+  compare(yard.scene, from_above(0.31, 30, -0.43, 15.7), plain_light(160, 120), "shapes_flat");
 }
 
 // A roof of cubes casts its shadow on slabs. Lamps are above it.
@@ -165,7 +165,7 @@ TEST_F(VulkanShapeFaces, CutoutTexelsMatchCpu) {
   grid.fill_box({{-1, 0, -1}, {1, 2, 0}}, stone);
   grid.set({4, 1, 4}, leaves);
   place(scene, std::move(grid));
-  RenderOptions options = plain(200, 150);
+  RenderOptions options = plain_light(200, 150);
   compare(scene, towards({7, 5, 9}, {0, 1, 0}), options, "cutout_near");
   compare(scene, towards({-50, 30, -45}, {0, 1, 0}, 0.2), options, "cutout_distant");
   if (!is_nightly()) return;
@@ -174,7 +174,7 @@ TEST_F(VulkanShapeFaces, CutoutTexelsMatchCpu) {
 }
 
 // Looks towards -Z; every ray passes straight through a pane.
-Camera straight(DVec3 position, double view_height) {
+Camera facing_panes(DVec3 position, double view_height) {
   Camera camera;
   camera.position = position;
   camera.projection = Camera::Projection::Orthographic;
@@ -198,8 +198,8 @@ TEST_F(VulkanShapeFaces, TranslucentFacesMatchCpu) {
   grid.fill_box({{6, 1, 0}, {10, 5, 1}}, pane);
   grid.fill_box({{8, 3, 3}, {15, 7, 4}}, types.pane);
   place(scene, std::move(grid));
-  const RenderOptions options = vulkan_test::of_day(plain(128, 96));
-  const Camera camera = straight({8.03, 4.02, 60}, 9.0);
+  const RenderOptions options = vulkan_test::of_day(plain_light(128, 96));
+  const Camera camera = facing_panes({8.03, 4.02, 60}, 9.0);
   put(scene, vulkan_test::blocky_surfaces(scene));
   MeshImageOptions meshes = mesh_options(options);
   meshes.glass_by_rays = false;
@@ -229,15 +229,15 @@ TEST_F(VulkanShapeFaces, CutoutPlatesAreSeenFromBothSides) {
     for (int z = -3; z < 5; z += 2) grid.set({x, 0, z}, x < 0 ? crossed : z < 0 ? box : single);
   }
   place(scene, std::move(grid));
-  compare(scene, towards({4, 5, 7}, {0, 0, 0}), plain(200, 150), "plates_above");
-  compare(scene, towards({-5, 0.3, -4}, {2, 0.6, 1}), plain(200, 150), "plates_below");
+  compare(scene, towards({4, 5, 7}, {0, 0, 0}), plain_light(200, 150), "plates_above");
+  compare(scene, towards({-5, 0.3, -4}, {2, 0.6, 1}), plain_light(200, 150), "plates_below");
 }
 
 // Texture and tint of a type's faces are those of its last update, without new meshes.
 TEST_F(VulkanShapeFaces, EditsMatchCpu) {
   Yard yard;
   const Camera camera = towards({9, 8, 14}, {0, 1, 0});
-  const RenderOptions options = vulkan_test::of_day(plain(160, 120));
+  const RenderOptions options = vulkan_test::of_day(plain_light(160, 120));
   put(yard.scene, vulkan_test::blocky_surfaces(yard.scene));
   VoxelProperties stairs = yard.scene.types[yard.textured_stairs];
   stairs.faces = VoxelFace{.texture = random_texture(16, 99), .turn = 3, .tint = {120, 255, 120}};
@@ -258,7 +258,7 @@ TEST_F(VulkanShapeFaces, NormalsMatchCpu) {
   if (!is_nightly()) GTEST_SKIP() << "nightly only";
   Yard yard;
   yard.add_turned({-3.0, 9.5, 2.0});
-  RenderOptions options = plain(120, 90);
+  RenderOptions options = plain_light(120, 90);
   options.light.shading = Shading::Normals;
   compare(yard.scene, towards({9, 8, 14}, {0, 1, 0}), options, "normals");
 }
@@ -271,7 +271,7 @@ TEST_F(VulkanShapeFaces, DrawsEdgesOfShapes) {
   grid.set({0, 0, 0}, types.stairs);
   place(scene, std::move(grid));
   put(scene, vulkan_test::blocky_surfaces(scene));
-  MeshImageOptions options = mesh_options(plain(64, 64));
+  MeshImageOptions options = mesh_options(plain_light(64, 64));
   const Camera camera = towards({2, 2, 3}, {0.5, 0.5, 0.5});
   const Image filled = drawn(camera, options);
   options.wireframe = Wireframe::Over;
