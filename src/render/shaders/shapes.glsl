@@ -20,13 +20,13 @@ const uint kSideVectors = 5;
 const uint kNoSide = 0xFFFF;
 const uint kCutoutAlpha = 128;  // texels are visible from here on
 
-// Of a shape in a list.
+// Parts and flags of a shape in a list.
 const uint kShapeType = 0xFFFF;
 const uint kShapePlace = 16;  // bits: x + 3 y + 9 z of the shape's voxel, from the one below the cell on each axis
 const uint kShapeIsLast = 1u << 21;
 const uint kShapeIsOpaque = 1u << 22;  // its material
 
-// Of a side; bits 0 to 3 are log2 of the texels per side.
+// Flags of a side; bits 0 to 3 are log2 of the texels per side.
 const uint kSideHides = 1u << 4;     // the background, wherever it is
 const uint kSideIsCutout = 1u << 5;  // or where texels are visible
 const uint kSideHasLook = 1u << 6;
