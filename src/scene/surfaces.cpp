@@ -11,6 +11,7 @@
 #include <quoin/core/assert.h>
 
 #include "core/srgb.h"
+#include "grid/shapes/shape_index.h"
 
 namespace quoin {
 
@@ -129,6 +130,12 @@ class MaterialShares {
 
 }  // namespace
 
+Vec3 mean_colour(const VoxelFace& face) {
+  const Vec3 tint = linear_colour(face.tint);
+  if (face.texture.is_null()) return tint;
+  return linear_colour(face.texture.level(face.texture.level_count() - 1)[0]) * tint;
+}
+
 FaceTexels face_texels(const VoxelFace& face, Direction direction, float emission) {
   const Texture& texture = face.texture;
   FaceTexels found;
@@ -206,6 +213,7 @@ void Surfaces::put(VoxelType type, const VoxelProperties& properties) {
   QUOIN_ASSERT(type + std::size_t{1} < surfaces_.size(), "a registered type");
   surfaces_[type] = surface_of(properties, clouds_);
   is_opaque_[type] = properties.visibility == Visibility::Opaque ? 1 : 0;
+  if (!properties.shapes.empty()) shape_means_[type] = quoin::mean_of_shapes(properties);
   if (faces_.empty()) return;
   faces_[type] = nullptr;
   if (properties.faces.empty()) return;
@@ -227,6 +235,7 @@ bool Surfaces::update(const VoxelRegistry& types) {
   surfaces_.back().colour = {1.0F, 0.0F, 1.0F};
   is_opaque_.resize(types.size());
   if (types.has_textures() || !faces_.empty()) faces_.resize(types.size());
+  if (types.has_shapes()) shape_means_.resize(types.size());
   for (std::size_t type = 0; changes->all && type < types.size(); ++type) {
     put(static_cast<VoxelType>(type), types[static_cast<VoxelType>(type)]);
   }

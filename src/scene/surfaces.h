@@ -121,6 +121,10 @@ struct FaceTexels {
   return std::clamp((exponent >> 1) + log_size, 0, log_size);
 }
 
+/// Returns the tinted mean of a face's texture in linear light, weighted by alpha: its last mipmap level. Without a
+/// texture, the tint.
+[[nodiscard]] Vec3 mean_colour(const VoxelFace& face);
+
 /// Prepares a face. Lifetime: that of its texture. Requires: the face has one.
 [[nodiscard]] FaceTexels face_texels(const VoxelFace& face, Direction direction, float emission);
 
@@ -160,6 +164,11 @@ class Surfaces {
   [[nodiscard]] const TypeFaces* faces(VoxelType type) const {
     return type < faces_.size() ? faces_[type].get() : nullptr;
   }
+  /// Returns the mean colour of a type's shapes, for cells of halved grids. Requires: the type has shapes.
+  [[nodiscard]] Vec3 mean_of_shapes(VoxelType type) const {
+    QUOIN_ASSERT(type < shape_means_.size(), "a type with shapes");
+    return shape_means_[type];
+  }
   /// Returns `faces` of all types; empty without textures.
   [[nodiscard]] std::span<const std::shared_ptr<const TypeFaces>> all_faces() const { return faces_; }
   /// Returns true if any type has textures.
@@ -197,6 +206,7 @@ class Surfaces {
   bool has_textures_ = false;
   bool has_textured_glass_ = false;
   bool has_cells_of_faces_ = false;
+  std::vector<Vec3> shape_means_;  // empty without shapes
 };
 
 /// The way of a ray through a cell, or through a block of cells of one type.

@@ -23,11 +23,26 @@ namespace [[gnu::visibility("default")]] quoin {
 ///          the volume of the result is at most 4 times the volume of the grid.
 /// Type:    opaque types win over transparent types. Among these, the type with the greatest weight wins; ties go to
 ///          the lower type. A voxel weighs 1, plus 8 per face that meets air (tuned on images of terrain).
+/// Shapes:  voxels whose type has shapes are air in these rules, and then count by their coverage: the mean share of a
+///          side that they hide along the three axes, without the part that lies on a face of another voxel. A cell
+///          that is not solid becomes one of their type with the probability c / (4 - n), where c is the sum of their
+///          coverages and n the number of other voxels. So thin shapes neither grow into full cells nor vanish: enough
+///          cells stay. A solid cell becomes one of their type with the probability of their share of its surface: c
+///          and the faces that they cover, against the open faces. A carpet thus colours the ground below. The cell's
+///          position decides, so the result is always the same. Opaque types win as above; shapes with glass sides do
+///          not replace opaque cells.
+/// States:  a cell of a type that its state turns (VoxelProperties::orientations) has the state of its voxels of that
+///          type with the greatest weight. Other data is not kept.
+/// Again:   `types` is for the voxels of `grid`. To halve the result, use `types_of_halved(types)`.
 /// Threads: the result is the same at any thread count.
 /// Cost:    1.3 to 3 ms per chunk of the result, for caves with several types.
 /// Errors:  Cancelled.
 [[nodiscard]] Result<Grid> downsample(const Grid& grid, const VoxelRegistry& types, Threads threads = {},
                                       const Progress& progress = {});
+
+/// Returns the types for halved grids: types with shapes are cubes of the mean colour of their sides, opaque unless a
+/// side is glass. Other types are the same. Cost: O(types with shapes).
+[[nodiscard]] VoxelRegistry types_of_halved(const VoxelRegistry& types);
 
 /// Computes one chunk of `downsample(grid, types)`, by its chunk coordinates in the result.
 ///
@@ -47,7 +62,8 @@ class GridPyramid {
   /// Updates the pyramid: halves `grid` up to `levels` times, or until nothing is left. Recomputes only chunks affected
   /// by edits since the last update, or all chunks if the grid is a different grid.
   ///
-  /// Requires: type visibilities are the same as in the last update; this is not checked.
+  /// States of shapes and of turned types count as edits.
+  /// Requires: type visibilities, shapes and orientations are the same as in the last update; this is not checked.
   /// Lifetime: grid and types are read only during the call. The next call may use snapshots of them instead.
   /// Cost:     `downsample_chunk` for each chunk that an edit can affect.
   void update(const Grid& grid, const VoxelRegistry& types, int levels, Threads threads = {});

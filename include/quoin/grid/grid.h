@@ -40,7 +40,7 @@ struct PlacedVoxel {
 ///           reports old and new types.
 /// Data:     voxels other than air can hold VoxelData. An edit that changes a voxel's type removes its data; an
 ///           edit that sets the same type keeps it. Whole chunks, snapshots, `copy_box` and extracted pieces include
-///           the data. Halved grids and density fields do not.
+///           the data. Halved grids keep only states that turn types (`downsample`); density fields have none.
 /// Partial:  a partial grid (`make_partial`) holds some chunks of a world that is larger than memory. Unloaded chunks
 ///           read as air, but their real content is unknown. Edits do not change them. A chunk is meshed only if all
 ///           chunks around it are loaded. Scene queries report unloaded chunks (UnloadedChunks). Functions that count

@@ -2,11 +2,16 @@
 
 #include <algorithm>
 #include <bit>
+#include <map>
+#include <optional>
+#include <utility>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/hash.h>
 
 #include "core/rows/packed_row.h"
 #include "grid/chunk/chunk_storage.h"
+#include "grid/shapes/shape_index.h"
 
 namespace quoin {
 namespace {
@@ -48,14 +53,16 @@ WordCells cells_of(const CellVoxels& voxels) {
   return cells;
 }
 
-// The rows of a chunk as masks of non-air voxels. Looks up air in the palette once.
+// The rows of a chunk as masks of non-air voxels without shapes. Looks up air in the palette once.
 class SolidRows {
  public:
-  explicit SolidRows(const Chunk& chunk) : voxels_(ChunkStorage::of(chunk)) {
+  SolidRows(const Chunk& chunk, const VoxelRegistry& types) : voxels_(ChunkStorage::of(chunk)) {
     if (voxels_ == nullptr) {
-      uniform_ = chunk.uniform() == kAir ? 0 : ~std::uint64_t{0};
+      const VoxelType type = *chunk.uniform();
+      uniform_ = type == kAir || types.is_shaped(type) ? 0 : ~std::uint64_t{0};
       return;
     }
+    if (types.has_shapes()) find_shaped(types);
     if (voxels_->direct()) return;
     const auto& palette = voxels_->palette;
     const auto found = std::find(palette.begin(), palette.end(), kAir);
@@ -65,6 +72,8 @@ class SolidRows {
 
   [[nodiscard]] std::uint64_t row(int y, int z) const {
     if (voxels_ == nullptr) return uniform_;
+    if (!shaped_.empty()) [[unlikely]]
+      return row_without_shapes(y, z);
     if (!has_air_) return ~std::uint64_t{0};
     const std::uint32_t slab = voxels_->slabs[ChunkStorage::slab_index(y, z)];
     if ((slab & ChunkStorage::kUniformSlab) != 0)
@@ -76,6 +85,8 @@ class SolidRows {
   [[nodiscard]] std::uint64_t end_of_row(int y, int z, bool is_first) const {
     const std::uint64_t ends = is_first ? 3U : std::uint64_t{3} << 62;
     if (voxels_ == nullptr) return uniform_ & ends;
+    if (!shaped_.empty()) [[unlikely]]
+      return row_without_shapes(y, z) & ends;
     if (!has_air_) return ends;
     const std::uint32_t slab = voxels_->slabs[ChunkStorage::slab_index(y, z)];
     if ((slab & ChunkStorage::kUniformSlab) != 0) return (slab & ~ChunkStorage::kUniformSlab) == air_ ? 0 : ends;
@@ -89,7 +100,13 @@ class SolidRows {
   /// The 16 rows of a slab in the order in which they are stored.
   void slab(std::size_t index, std::array<std::uint64_t, 16>& out) const {
     const std::uint32_t slot = voxels_ == nullptr ? ChunkStorage::kUniformSlab : voxels_->slabs[index];
-    if ((slot & ChunkStorage::kUniformSlab) != 0 || !has_air_) {
+    if (!shaped_.empty()) [[unlikely]] {
+      for (int i = 0; i < 16; ++i) {
+        const int y = static_cast<int>(index % 16) * 4 + i % 4;
+        const int z = static_cast<int>(index / 16) * 4 + i / 4;
+        out[static_cast<std::size_t>(ChunkStorage::row_in_slab(y, z))] = row_without_shapes(y, z);
+      }
+    } else if ((slot & ChunkStorage::kUniformSlab) != 0 || !has_air_) {
       const int y = static_cast<int>(index % 16) * 4;
       const int z = static_cast<int>(index / 16) * 4;
       out.fill(row(y, z));
@@ -103,6 +120,32 @@ class SolidRows {
   }
 
  private:
+  // Lists air and the types with shapes by their numbers in the chunk, if there are any with shapes.
+  void find_shaped(const VoxelRegistry& types) {
+    const std::size_t count = voxels_->direct() ? types.size() : voxels_->palette.size();
+    for (std::size_t i = 0; i < count; ++i) {
+      const VoxelType type = voxels_->direct() ? static_cast<VoxelType>(i) : voxels_->palette[i];
+      if (types.is_shaped(type)) shaped_.push_back(static_cast<std::uint32_t>(i));
+    }
+    if (shaped_.empty()) return;
+    for (std::size_t i = 0; i < count; ++i) {
+      const VoxelType type = voxels_->direct() ? static_cast<VoxelType>(i) : voxels_->palette[i];
+      if (type == kAir) shaped_.push_back(static_cast<std::uint32_t>(i));
+    }
+  }
+  [[nodiscard]] std::uint64_t row_without_shapes(int y, int z) const {
+    const std::uint32_t slab = voxels_->slabs[ChunkStorage::slab_index(y, z)];
+    const bool is_uniform = (slab & ChunkStorage::kUniformSlab) != 0;
+    std::uint64_t others = 0;
+    for (const std::uint32_t number : shaped_) {
+      if (is_uniform) {
+        if ((slab & ~ChunkStorage::kUniformSlab) == number) return 0;
+      } else {
+        others |= packed_row::equal_mask(voxels_->row(slab, ChunkStorage::row_in_slab(y, z)), voxels_->bits, number);
+      }
+    }
+    return ~others;
+  }
   // Processes all words first, in a loop that compilers vectorise.
   void where_not_air_of_two_bits(const std::uint64_t* words, std::array<std::uint64_t, 16>& out) const {
     const std::uint64_t air = packed_row::repeat(2, air_);
@@ -118,11 +161,12 @@ class SolidRows {
   std::uint64_t uniform_ = 0;
   std::uint32_t air_ = kAir;
   bool has_air_ = true;
+  std::vector<std::uint32_t> shaped_;  // air and types with shapes; empty if there are none with shapes
 };
 
 }  // namespace
 
-HalvingMasks::HalvingMasks(const Grid& grid, IVec3 chunk)
+HalvingMasks::HalvingMasks(const Grid& grid, const VoxelRegistry& types, IVec3 chunk)
     : fine_(std::size_t{kRows} * kRows), cells_(std::size_t{kCellRows} * kCellRows) {
   for (int z = -1; z <= 2; ++z) {
     for (int y = -1; y <= 2; ++y) {
@@ -132,7 +176,7 @@ HalvingMasks::HalvingMasks(const Grid& grid, IVec3 chunk)
         for (int axis = 0; axis < 3; ++axis) outside += at[axis] < 0 || at[axis] > 1;
         if (outside > 1) continue;
         chunks_[slot(at)] = grid.find_chunk(2 * chunk + at);
-        if (chunks_[slot(at)] != nullptr) read_voxels(at);
+        if (chunks_[slot(at)] != nullptr) read_voxels(at, types);
       }
     }
   }
@@ -141,8 +185,8 @@ HalvingMasks::HalvingMasks(const Grid& grid, IVec3 chunk)
   }
 }
 
-void HalvingMasks::read_voxels(IVec3 octant) {
-  const SolidRows solid(*chunks_[slot(octant)]);
+void HalvingMasks::read_voxels(IVec3 octant, const VoxelRegistry& types) {
+  const SolidRows solid(*chunks_[slot(octant)], types);
   const IVec3 first = octant * kChunkEdge;
   const IVec3 low = glm::max(IVec3(-2) - first, IVec3(0));
   const IVec3 high = glm::min(IVec3(kFineEdge + 2) - first, IVec3(kChunkEdge));
@@ -302,6 +346,8 @@ Chunk ChunkHalver::make() {
       for (const Run& run : runs_) made.fill_row(y, z, run.cells, run.type);
     }
   }
+  if (types_->has_shapes()) add_shapes(made);
+  if (types_->has_turned_by_state()) copy_states(made);
   made.compact();
   return made;
 }
@@ -382,6 +428,218 @@ void ChunkHalver::fill_mixed(int half, int y, int z, std::uint64_t mixed) {
     layers_[heaviest(exposed, x)].won |= std::uint64_t{1} << x;
   }
   for (const Layer& layer : layers_) add(layer.type, half, layer.won);
+}
+
+namespace {
+
+std::uint32_t number_of(IVec3 cell) {
+  return static_cast<std::uint32_t>(cell.x + kChunkEdge * (cell.y + kChunkEdge * cell.z));
+}
+IVec3 cell_of(std::uint32_t number) {
+  const auto n = static_cast<int>(number);
+  return {n % kChunkEdge, n / kChunkEdge % kChunkEdge, n / kChunkEdge / kChunkEdge};
+}
+
+// The faces of the cubes in a cell.
+struct CellCubes {
+  int count = 0;
+  int open_faces = 0;  // that meet air or shapes
+};
+
+CellCubes cubes_in(const HalvingMasks& masks, IVec3 cell) {
+  CellCubes cubes;
+  for (int i = 0; i < 4; ++i) {
+    const IVec3 at = 2 * cell + IVec3{0, i & 1, i >> 1};
+    const int half = at.x / kChunkEdge;
+    const int x = at.x % kChunkEdge;
+    const std::uint64_t pair = masks.voxels(half, at.y, at.z) >> x & 3U;
+    if (pair == 0) continue;
+    cubes.count += std::popcount(pair);
+    const auto exposed = masks.exposed_faces(half, at.y, at.z);
+    for (std::size_t digit = 0; digit < exposed.size(); ++digit) {
+      cubes.open_faces += std::popcount(exposed[digit] >> x & pair) << digit;
+    }
+  }
+  return cubes;
+}
+
+// The shapes of one type in and around a cell.
+struct CellShapes {
+  VoxelType type = kAir;
+  bool is_opaque = true;
+  float filled = 0.0F;   // sum of the coverages of those in the cell
+  float covered = 0.0F;  // faces of the cell's cubes that they cover
+
+  [[nodiscard]] bool comes_before(const CellShapes& other, bool in_solid) const {
+    if (is_opaque != other.is_opaque) return is_opaque;
+    const float own = in_solid ? filled + covered : filled;
+    const float others = in_solid ? other.filled + other.covered : other.filled;
+    return own != others ? own > others : type < other.type;
+  }
+};
+
+// Counts the shapes around one chunk of a halved grid, by cell.
+class ShapeCounter {
+ public:
+  ShapeCounter(const Grid& grid, const VoxelRegistry& types, const HalvingMasks& masks, IVec3 chunk)
+      : grid_(&grid), types_(&types), masks_(&masks), origin_(chunk * (2 * kChunkEdge)) {}
+
+  [[nodiscard]] const std::map<std::uint32_t, std::vector<CellShapes>>& cells() const { return cells_; }
+
+  void take_chunk(IVec3 octant) {
+    const Chunk* const chunk = masks_->octant(octant);
+    if (chunk == nullptr) return;
+    const std::vector<VoxelType> all = chunk->types();
+    if (std::ranges::none_of(all, [&](VoxelType type) { return types_->is_shaped(type); })) return;
+    // Shapes next to the inside cover faces of its cubes.
+    const IVec3 first = octant * kChunkEdge;
+    const IVec3 low = glm::max(IVec3(-1) - first, IVec3(0));
+    const IVec3 high = glm::min(IVec3(2 * kChunkEdge + 1) - first, IVec3(kChunkEdge));
+    std::array<VoxelType, kChunkEdge> row;
+    for (int z = low.z; z < high.z; ++z) {
+      for (int y = low.y; y < high.y; ++y) {
+        chunk->read_row(y, z, row);
+        for (int x = low.x; x < high.x; ++x) {
+          const VoxelType type = row[static_cast<std::size_t>(x)];
+          if (types_->is_shaped(type)) take_voxel(first + IVec3{x, y, z}, type);
+        }
+      }
+    }
+  }
+
+ private:
+  static constexpr IBox kInside{IVec3(0), IVec3(2 * kChunkEdge)};
+
+  void take_voxel(IVec3 fine, VoxelType type) {
+    const ShapeModel& model = *shape_at(*grid_, *types_, origin_ + fine);
+    const auto [known, is_new] = coverages_.try_emplace({type, &model});
+    if (is_new) known->second = coverage_of(model, (*types_)[type].faces);
+    const bool is_inside = kInside.contains(fine);
+    Vec3 hidden(0.0F);  // on faces of cubes, along each axis
+    for (const Direction direction : kDirections) {
+      int squares = 0;
+      for (const std::uint64_t word : model.sides[static_cast<std::size_t>(direction)]) squares += std::popcount(word);
+      const IVec3 next = fine + normal_of(direction);
+      const bool is_next_inside = kInside.contains(next);
+      if (squares == 0 || !(is_inside || is_next_inside) || !masks_->is_cube(next)) continue;
+      const float share = static_cast<float>(squares) / 256.0F;
+      float& along = hidden[frame_of(direction).axis];
+      along = std::max(along, share);
+      if (is_next_inside && !is_glass(type)) shapes_in(next, type).covered += share;
+    }
+    if (!is_inside) return;
+    const Vec3 seen = glm::max(known->second - hidden, Vec3(0.0F));
+    const float filled = (seen.x + seen.y + seen.z) / 3.0F;
+    if (filled > 0.0F) shapes_in(fine, type).filled += filled;
+  }
+
+  [[nodiscard]] bool is_glass(VoxelType type) {
+    const auto [known, is_new] = is_glass_.try_emplace(type);
+    if (is_new) known->second = has_glass_parts((*types_)[type]);
+    return known->second;
+  }
+
+  CellShapes& shapes_in(IVec3 fine, VoxelType type) {
+    std::vector<CellShapes>& all = cells_[number_of(fine / 2)];
+    const auto found = std::ranges::find(all, type, &CellShapes::type);
+    if (found != all.end()) return *found;
+    return all.emplace_back(CellShapes{.type = type, .is_opaque = !is_glass(type)});
+  }
+
+  const Grid* grid_;
+  const VoxelRegistry* types_;
+  const HalvingMasks* masks_;
+  IVec3 origin_;
+  std::map<std::uint32_t, std::vector<CellShapes>> cells_;
+  std::map<std::pair<VoxelType, const ShapeModel*>, Vec3> coverages_;
+  std::map<VoxelType, bool> is_glass_;
+};
+
+// Returns a number from 0 up to, but not including, 1, that depends only on the cell of the halved grid.
+float number_of_cell(IVec3 cell) {
+  std::uint32_t hash = mix_bits(static_cast<std::uint32_t>(cell.x));
+  hash = mix_bits(hash ^ static_cast<std::uint32_t>(cell.y));
+  hash = mix_bits(hash ^ static_cast<std::uint32_t>(cell.z));
+  return static_cast<float>(hash >> 8) / static_cast<float>(1U << 24);
+}
+
+// Returns the shape's type that a cell becomes; air if it stays. `number`: of the cell. `present`: its type by its
+// cubes.
+VoxelType shape_of_cell(const std::vector<CellShapes>& shapes, const CellCubes& cubes, float number, VoxelType present,
+                        const VoxelRegistry& types) {
+  const bool is_solid = present != kAir;
+  const auto best = std::ranges::min_element(
+      shapes, [&](const CellShapes& a, const CellShapes& b) { return a.comes_before(b, is_solid); });
+  float filled = 0.0F;
+  float covered = 0.0F;
+  for (const CellShapes& each : shapes) {
+    // Glass hides no cubes.
+    if (is_solid && each.is_opaque != best->is_opaque) continue;
+    filled += each.filled;
+    covered += each.covered;
+  }
+  if (!is_solid) {
+    const bool is_kept = best->filled > 0.0F && number * static_cast<float>(4 - cubes.count) < filled;
+    return is_kept ? best->type : kAir;
+  }
+  if (!best->is_opaque && types.is_opaque(present)) return kAir;
+  const float seen_cubes = std::max(static_cast<float>(cubes.open_faces) - covered, 0.0F);
+  const float seen_shapes = filled + covered;
+  return number * (seen_shapes + seen_cubes) < seen_shapes ? best->type : kAir;
+}
+
+}  // namespace
+
+void ChunkHalver::add_shapes(Chunk& made) const {
+  ShapeCounter shapes(*grid_, *types_, masks_, chunk_);
+  for (int i = 0; i < 64; ++i) shapes.take_chunk(IVec3{i & 3, i >> 2 & 3, i >> 4} - 1);
+  for (const auto& [number, all] : shapes.cells()) {
+    const IVec3 cell = cell_of(number);
+    const VoxelType present = made.get(cell);
+    const VoxelType chosen =
+        shape_of_cell(all, cubes_in(masks_, cell), number_of_cell(chunk_ * kChunkEdge + cell), present, *types_);
+    if (chosen != kAir) made.set(cell, chosen);
+  }
+}
+
+void ChunkHalver::copy_states(Chunk& made) const {
+  std::vector<std::uint32_t> cells;  // that hold turned voxels
+  for (int i = 0; i < 8; ++i) {
+    const IVec3 octant{i & 1, i >> 1 & 1, i >> 2};
+    const Chunk* const chunk = masks_.octant(octant);
+    if (chunk == nullptr || chunk->data_count() == 0) continue;
+    chunk->for_each_data([&](IVec3 local, const VoxelData& data) {
+      if (data.state == 0 || !types_->is_turned_by_state(chunk->get(local))) return;
+      cells.push_back(number_of((octant * kChunkEdge + local) / 2));
+    });
+  }
+  std::ranges::sort(cells);
+  cells.erase(std::ranges::unique(cells).begin(), cells.end());
+  for (const std::uint32_t number : cells) {
+    const IVec3 cell = cell_of(number);
+    const VoxelType type = made.get(cell);
+    if (!types_->is_turned_by_state(type)) continue;
+    if (const std::uint32_t state = state_of(cell, type); state != 0) made.set_data(cell, {.state = state});
+  }
+}
+
+// Returns the state of the greatest weight among a cell's voxels of a type; the lower one on ties.
+std::uint32_t ChunkHalver::state_of(IVec3 cell, VoxelType type) const {
+  std::map<std::uint32_t, int> weights;
+  for (int i = 0; i < 8; ++i) {
+    const IVec3 fine = 2 * cell + IVec3{i & 1, i >> 1 & 1, i >> 2};
+    const Chunk* const chunk = masks_.octant(fine / kChunkEdge);
+    const IVec3 local = fine % kChunkEdge;
+    if (chunk == nullptr || chunk->get(local) != type) continue;
+    int weight = 1;
+    const auto exposed = masks_.exposed_faces(fine.x / kChunkEdge, fine.y, fine.z);
+    for (std::size_t digit = 0; digit < exposed.size(); ++digit) {
+      weight += static_cast<int>(exposed[digit] >> local.x & 1U) << (3 + digit);
+    }
+    weights[chunk->data(local).state] += weight;
+  }
+  const auto best = std::ranges::max_element(weights, {}, [](const auto& each) { return each.second; });
+  return best == weights.end() ? 0 : best->first;
 }
 
 std::size_t ChunkHalver::heaviest(const Exposed& exposed, int x) const {

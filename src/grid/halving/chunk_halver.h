@@ -23,23 +23,30 @@ constexpr std::uint64_t even_bits(std::uint64_t bits) {
   return (bits | bits >> 16) & 0x0000'0000'FFFF'FFFFU;
 }
 
-/// The non-air voxels around one chunk of a halved grid, and the cells that are solid for that reason.
+/// The cubes around one chunk of a halved grid, and the cells that are solid for that reason. Cubes are all voxels except
+/// air and those with shapes.
 ///
 /// Space: fine, voxels from the chunk's least corner, -2 to 129 on each axis; cells, -1 to 64. Outside of the
 ///        chunk, only voxels and cells that share a face with the inside are known.
 class HalvingMasks {
  public:
   /// `chunk` is of the halved grid.
-  HalvingMasks(const Grid& grid, IVec3 chunk);
+  HalvingMasks(const Grid& grid, const VoxelRegistry& types, IVec3 chunk);
 
   /// Returns the chunk of the full grid at `octant`, 0 or 1 on each axis; null if all is air.
   [[nodiscard]] const Chunk* octant(IVec3 octant) const { return chunks_[slot(octant)]; }
   /// The solid cells of a row, 0 <= y, z < 64.
   [[nodiscard]] std::uint64_t solid_cells(int y, int z) const;
-  /// Returns the non-air voxels of half a row, 0 <= y, z < 128; `half` is 0 or 1.
+  /// Returns the cubes of half a row, 0 <= y, z < 128; `half` is 0 or 1.
   [[nodiscard]] std::uint64_t voxels(int half, int y, int z) const {
     QUOIN_ASSERT(half == 0 || half == 1, "one of two halves");
     return fine(y, z)[static_cast<std::size_t>(half + 1)];
+  }
+  /// Returns true for a cube. `voxel`: from the chunk's least corner, inside the chunk or next to a voxel inside.
+  [[nodiscard]] bool is_cube(IVec3 voxel) const {
+    QUOIN_ASSERT(voxel.x >= -2 && voxel.x < kFineEdge + 2, "-2 <= x < 130");
+    const int x = voxel.x + kChunkEdge;
+    return (fine(voxel.y, voxel.z)[static_cast<std::size_t>(x / kChunkEdge)] >> (x % kChunkEdge) & 1U) != 0;
   }
   /// Returns the number of exposed faces of each voxel of half a row, as bit planes: [0] ones, [1] twos, [2] fours.
   [[nodiscard]] std::array<std::uint64_t, 3> exposed_faces(int half, int y, int z) const;
@@ -78,7 +85,7 @@ class HalvingMasks {
     QUOIN_ASSERT(std::min(y, z) >= -1 && std::max(y, z) <= kChunkEdge, "-1 <= y, z <= 64");
     return cells_[static_cast<std::size_t>((z + 1) * kCellRows + y + 1)];
   }
-  void read_voxels(IVec3 octant);
+  void read_voxels(IVec3 octant, const VoxelRegistry& types);
   void count_cells(int y, int z);
   [[nodiscard]] std::uint64_t kept_rods(int y, int z, int axis) const;
 
@@ -93,7 +100,8 @@ class HalvingMasks {
 /// types are examined one by one.
 class ChunkHalver {
  public:
-  ChunkHalver(const Grid& grid, const VoxelRegistry& types, IVec3 chunk) : masks_(grid, chunk), types_(&types) {}
+  ChunkHalver(const Grid& grid, const VoxelRegistry& types, IVec3 chunk)
+      : masks_(grid, types, chunk), grid_(&grid), types_(&types), chunk_(chunk) {}
 
   [[nodiscard]] Chunk make();
 
@@ -121,9 +129,16 @@ class ChunkHalver {
   /// Returns the heaviest of the layers in a cell.
   [[nodiscard]] std::size_t heaviest(const Exposed& exposed, int x) const;
   void add(VoxelType type, int half, std::uint64_t cells);
+  // Adds the cells that shapes fill or cover.
+  void add_shapes(Chunk& made) const;
+  // Copies the states that turn types.
+  void copy_states(Chunk& made) const;
+  [[nodiscard]] std::uint32_t state_of(IVec3 cell, VoxelType type) const;
 
   HalvingMasks masks_;
+  const Grid* grid_;
   const VoxelRegistry* types_;
+  IVec3 chunk_;
   std::vector<Layer> layers_;
   std::vector<Run> runs_;
 };

@@ -15,12 +15,14 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/grid/density_grid.h>
+#include <quoin/grid/texture.h>
 
 #include "core/coordinates/chunk_order.h"
 #include "core/moved_from.h"
 #include "core/work/progress_steps.h"
 #include "grid/density/density_storage.h"
 #include "grid/halving/chunk_halver.h"
+#include "grid/shapes/shape_index.h"
 
 namespace quoin {
 namespace {
@@ -284,12 +286,23 @@ IVec3 halved_coordinates(IVec3 chunk) {
   return {chunk.x >> 1, chunk.y >> 1, chunk.z >> 1};
 }
 
+// The voxel data that halving reads.
+struct States {
+  const Grid* grid;  // null: none
+  [[nodiscard]] DataChanges changes_since(ChangeCursor& cursor) const {
+    return grid == nullptr ? DataChanges() : grid->data_changes_since(cursor);
+  }
+};
+
 // A halved chunk of voxels.
 struct VoxelHalving {
   using Content = Grid;
   using Made = Chunk;
   const VoxelRegistry* types;
 
+  [[nodiscard]] States states(const Grid& finer) const {
+    return {types->has_shapes() || types->has_turned_by_state() ? &finer : nullptr};
+  }
   [[nodiscard]] Chunk make(const Grid& finer, IVec3 chunk) const { return downsample_chunk(finer, *types, chunk); }
 };
 
@@ -298,6 +311,10 @@ struct DensityHalving {
   using Content = DensityGrid;
   using Made = HalvedDensityChunk;
 
+  [[nodiscard]] static States states(const DensityGrid& finer) {
+    static_cast<void>(finer);
+    return {nullptr};
+  }
   [[nodiscard]] static HalvedDensityChunk make(const DensityGrid& finer, IVec3 chunk) {
     return DensityHalver(finer, chunk).make();
   }
@@ -354,17 +371,21 @@ struct Level : Kept {
   using Content = typename Halving::Content;
   using Kept::content;
   ChangeCursor followed;
+  ChangeCursor followed_states;
 
   // Returns false, without a change, if `progress` cancelled the update.
   bool update(const Content& finer, const Halving& halving, Threads threads, const Progress& progress = {}) {
     PendingChanges changes(followed, finer);
+    const States states = halving.states(finer);
+    PendingChanges state_changes(followed_states, states);
     std::vector<IVec3> dirty;
-    if (changes->all) {
-      Kept::begin(finer);
+    if (changes->all) Kept::begin(finer);
+    if (changes->all || state_changes->all) {
       dirty = content.chunks();
       for (const IVec3 chunk : finer.chunks()) dirty.push_back(halved_coordinates(chunk));
     }
     for (const auto& change : changes->items_unless_all()) add_readers(change, dirty);
+    for (const auto& change : state_changes->items_unless_all()) add_readers(change, dirty);
     sort_and_unite(dirty);
     std::erase_if(dirty, [&](IVec3 chunk) {
       for (int i = 0; i < 8; ++i) {
@@ -382,6 +403,7 @@ struct Level : Kept {
     if (steps.cancelled()) return false;
     for (std::size_t i = 0; i < dirty.size(); ++i) Kept::put(dirty[i], std::move(made[i]));
     changes.commit();
+    state_changes.commit();
     return true;
   }
 };
@@ -392,13 +414,14 @@ struct Levels {
   using Content = typename Halving::Content;
   std::vector<std::unique_ptr<Level<Halving, Kept>>> kept;
 
-  void update(const Content& full, const Halving& halving, int levels, Threads threads) {
+  // `first`: for the first level, `others`: for the ones after it.
+  void update(const Content& full, const Halving& first, const Halving& others, int levels, Threads threads) {
     const Content* finer = &full;
     const auto wanted = static_cast<std::size_t>(std::max(levels, 0));
     kept.resize(std::min(kept.size(), wanted));
     for (std::size_t i = 0; i < wanted; ++i) {
       if (i == kept.size()) kept.push_back(std::make_unique<Level<Halving, Kept>>());
-      kept[i]->update(*finer, halving, threads);
+      kept[i]->update(*finer, i == 0 ? first : others, threads);
       finer = &kept[i]->content;
       if (finer->chunk_count() != 0) continue;
       // An empty level stays, although it does not count, so that the next edit does not rebuild it.
@@ -417,6 +440,24 @@ struct Levels {
 };
 
 }  // namespace
+
+VoxelRegistry types_of_halved(const VoxelRegistry& types) {
+  VoxelRegistry cubes = types;
+  for (std::size_t i = 0; types.has_shapes() && i < types.size(); ++i) {
+    const auto type = static_cast<VoxelType>(i);
+    if (!types.is_shaped(type)) continue;
+    VoxelProperties cube = types[type];
+    const std::uint8_t alpha = cube.colour.a;
+    cube.colour = srgb_colour(mean_of_shapes(cube));
+    const bool is_glass = has_glass_parts(cube);
+    cube.visibility = is_glass ? Visibility::Transparent : Visibility::Opaque;
+    cube.colour.a = is_glass ? alpha : 255;
+    cube.faces = {};
+    cube.shapes = {};
+    cubes.replace(type, std::move(cube));
+  }
+  return cubes;
+}
 
 Chunk downsample_chunk(const Grid& grid, const VoxelRegistry& types, IVec3 chunk) {
   return ChunkHalver(grid, types, chunk).make();
@@ -442,7 +483,9 @@ GridPyramid& GridPyramid::operator=(GridPyramid&&) noexcept = default;
 GridPyramid::~GridPyramid() = default;
 
 void GridPyramid::update(const Grid& grid, const VoxelRegistry& types, int levels, Threads threads) {
-  impl_of(impl_).update(grid, {&types}, levels, threads);
+  std::optional<VoxelRegistry> cubes;
+  if (types.has_shapes()) cubes = types_of_halved(types);
+  impl_of(impl_).update(grid, {&types}, {cubes ? &*cubes : &types}, levels, threads);
 }
 
 int GridPyramid::levels() const {
@@ -461,7 +504,7 @@ DensityPyramid& DensityPyramid::operator=(DensityPyramid&&) noexcept = default;
 DensityPyramid::~DensityPyramid() = default;
 
 void DensityPyramid::update(const DensityGrid& field, int levels, Threads threads) {
-  impl_of(impl_).update(field, {}, levels, threads);
+  impl_of(impl_).update(field, {}, {}, levels, threads);
 }
 
 int DensityPyramid::levels() const {

@@ -110,6 +110,18 @@ class ShapesAtVoxel {
   IVec3 voxel_{0};
 };
 
+// Returns the area of a voxel's side that a shape covers if seen along each axis, 0 to 1. Cutout sides count by their
+// visible texels. Parts behind each other count separately.
+[[nodiscard]] Vec3 coverage_of(const ShapeModel& model, const VoxelFaces& type_faces);
+
+// Returns true if a type's shapes have parts that tint light: without textures or with translucent ones. Requires: the
+// type has shapes.
+[[nodiscard]] bool has_glass_parts(const VoxelProperties& type);
+
+// Returns the mean colour of the drawn sides of all shapes of a type by their areas, in linear light. Cutout sides count
+// by their visible texels. Requires: the type has shapes.
+[[nodiscard]] Vec3 mean_of_shapes(const VoxelProperties& type);
+
 // The shaped voxels of a grid, by the voxels that they touch: a shape may reach outside its own voxel. Chunks without
 // shapes take no memory; a copy shares all chunks with the original until either is updated.
 class ShapeIndex {

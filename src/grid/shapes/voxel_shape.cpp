@@ -4,11 +4,16 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
+#include <ranges>
 #include <string>
 #include <utility>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+
 #include <quoin/grid/voxel_registry.h>
+
+#include "grid/shapes/shape_index.h"
 
 namespace quoin {
 namespace {
@@ -233,6 +238,74 @@ std::uint32_t placed_state(const VoxelProperties& type, const PlacingHit& hit, s
     best_fit = fit;
   }
   return orientations.with_value(state, best);
+}
+
+namespace {
+
+// Returns the share of a side that is visible.
+float visible_share(const VoxelFace* look) {
+  const bool is_cutout = look != nullptr && !look->texture.is_null() && look->alpha == FaceAlpha::Cutout;
+  return is_cutout ? look->texture.coverage() : 1.0F;
+}
+
+}  // namespace
+
+Vec3 coverage_of(const ShapeModel& model, const VoxelFaces& type_faces) {
+  if (model.is_full) return Vec3(1.0F);
+  Vec3 seen(0.0F);
+  for (const ModelFace& face : model.faces) {
+    if (face.is_inner) continue;
+    const auto& at = face.corners;
+    // Each axis shows a front and a back.
+    const Vec3 area = 0.5F * glm::cross(at[2] - at[0], at[3] - at[1]);
+    seen += 0.5F * visible_share(look_of(model, face, type_faces)) * glm::abs(area);
+  }
+  return glm::min(seen, Vec3(1.0F));
+}
+
+Vec3 mean_of_shapes(const VoxelProperties& type) {
+  Vec3 sum(0.0F);
+  float weight = 0.0F;
+  const auto add = [&](const ElementFace& face, Direction side, float area) {
+    if (!face.is_drawn) return;
+    const VoxelFace* const look = face.face ? &*face.face : type.faces.empty() ? nullptr : &type.faces[side];
+    Vec3 colour = linear_colour(look == nullptr ? type.colour : look->tint);
+    if (look != nullptr && !look->texture.is_null()) colour *= look->texture.mean();
+    const float share = area * visible_share(look);
+    sum += share * colour;
+    weight += share;
+  };
+  const auto add_element = [&](const ShapeElement& element) {
+    const Vec3 size = element.max - element.min;
+    for (const Direction side : kDirections) {
+      const FaceFrame& frame = frame_of(side);
+      add(element.faces[static_cast<std::size_t>(side)], side, size[frame.u] * size[frame.v]);
+    }
+  };
+  const ShapeRules& rules = type.shapes.rules();
+  if (rules.neighbours == ShapeNeighbours::Fluid) add_element({});
+  for (const ShapePart& part : rules.parts) {
+    for (const ShapeElement& element : part.shape.elements()) add_element(element);
+  }
+  return weight > 0.0F ? sum / weight : linear_colour(type.colour);
+}
+
+bool has_glass_parts(const VoxelProperties& type) {
+  if (type.visibility != Visibility::Transparent) return false;
+  const auto is_glass = [](const VoxelFace* look) {
+    return look == nullptr || look->texture.is_null() || look->alpha == FaceAlpha::Translucent;
+  };
+  const auto has_glass_side = [&](const ShapeElement& element) {
+    return std::ranges::any_of(kDirections, [&](Direction side) {
+      const ElementFace& face = element.faces[static_cast<std::size_t>(side)];
+      if (face.face) return face.is_drawn && is_glass(&*face.face);
+      return face.is_drawn && is_glass(type.faces.empty() ? nullptr : &type.faces[side]);
+    });
+  };
+  const ShapeRules& rules = type.shapes.rules();
+  if (rules.neighbours == ShapeNeighbours::Fluid) return has_glass_side({});
+  return std::ranges::any_of(
+      rules.parts, [&](const ShapePart& part) { return std::ranges::any_of(part.shape.elements(), has_glass_side); });
 }
 
 }  // namespace quoin

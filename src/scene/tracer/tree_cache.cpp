@@ -34,25 +34,6 @@ bool has_new_types(const Grid& grid, const GridChanges& changes, const Counts& c
   });
 }
 
-// Returns true if a type's shapes have parts that tint light: without textures or with translucent ones.
-bool has_glass_parts(const VoxelProperties& type) {
-  if (type.visibility != Visibility::Transparent) return false;
-  const auto is_glass = [](const VoxelFace* look) {
-    return look == nullptr || look->texture.is_null() || look->alpha == FaceAlpha::Translucent;
-  };
-  const auto has_glass_side = [&](const ShapeElement& element) {
-    return std::ranges::any_of(kDirections, [&](Direction side) {
-      const ElementFace& face = element.faces[static_cast<std::size_t>(side)];
-      if (face.face) return face.is_drawn && is_glass(&*face.face);
-      return face.is_drawn && is_glass(type.faces.empty() ? nullptr : &type.faces[side]);
-    });
-  };
-  const ShapeRules& rules = type.shapes.rules();
-  if (rules.neighbours == ShapeNeighbours::Fluid) return has_glass_side({});
-  return std::ranges::any_of(
-      rules.parts, [&](const ShapePart& part) { return std::ranges::any_of(part.shape.elements(), has_glass_side); });
-}
-
 // Returns a flag per type: its shapes have glass. Empty if no type's have.
 std::vector<std::uint8_t> glass_types(const VoxelRegistry& types) {
   std::vector<std::uint8_t> is_glass(types.size());
@@ -126,8 +107,10 @@ std::vector<IVec3> chunks_of_both(std::vector<IVec3> touched, const std::vector<
 
 // The voxel data of a grid, for PendingChanges.
 struct GridData {
-  const Grid& grid;
-  [[nodiscard]] DataChanges changes_since(ChangeCursor& cursor) const { return grid.data_changes_since(cursor); }
+  const Grid* grid;  // null: none
+  [[nodiscard]] DataChanges changes_since(ChangeCursor& cursor) const {
+    return grid == nullptr ? DataChanges() : grid->data_changes_since(cursor);
+  }
 };
 
 }  // namespace
@@ -145,6 +128,12 @@ int reach_of_shapes(const VoxelRegistry& types) {
     }
   }
   return 0;
+}
+
+bool has_other_shapes(const TypeChanges& changes, const VoxelRegistry& types) {
+  return changes.all || std::ranges::any_of(changes.items_unless_all(), [&](const TypeChange& change) {
+           return change.shape_changed || (change.colour_changed && types.is_shaped(change.type));
+         });
 }
 
 SplitField::SplitField(const DensityGrid& whole, const VoxelRegistry& types)
@@ -201,7 +190,7 @@ bool TreeCache::update_shapes(const Grid& grid, const VoxelRegistry& types, cons
     if (!has_new_types(grid, changes, [&](VoxelType type) { return types.is_shaped(type); })) return false;
     followed_data_ = {};
   }
-  const GridData data{grid};
+  const GridData data{&grid};
   PendingChanges data_changes(followed_data_, data);
   if (changes.empty() && data_changes->empty()) return false;
   if (is_new) shapes_ = std::make_unique<TracedShapes>();
@@ -307,11 +296,14 @@ void CoarseLevel::put_in(PlacedGrid& placed) const {
 void HalvedGridCache::Entry::make(const SceneGrid& grid, const VoxelRegistry& types, int halvings, Threads threads) {
   PendingChanges changes(followed, grid.grid);
   PendingChanges field_changes(followed_field, grid.field);
-  if (changes->all || field_changes->all) {
+  const GridData states{types.has_shapes() || types.has_turned_by_state() ? &grid.grid : nullptr};
+  PendingChanges state_changes(followed_states, states);
+  if (changes->all || field_changes->all || state_changes->all) {
     *this = {};
-  } else if (!changes->empty() || !field_changes->empty()) {
+  } else if (!changes->empty() || !field_changes->empty() || !state_changes->empty()) {
     renew(grid, types, threads);
   }
+  state_changes.commit();
   changes.commit();
   field_changes.commit();
   const int known = static_cast<int>(levels.size());
@@ -359,7 +351,9 @@ bool HalvedGridCache::Entry::take_level(const SceneGrid& grid, const VoxelRegist
   level.field = grid.field.chunk_count() != 0 ? &fields.level(halvings) : nullptr;
   level.level = halvings;
   const DensityGrid& field = level.field == nullptr ? no_field() : *level.field;
-  level.trees.update(*level.voxels, types);
+  std::optional<VoxelRegistry> cubes;
+  if (types.has_shapes()) cubes = types_of_halved(types);
+  level.trees.update(*level.voxels, cubes ? *cubes : types);
   level.trees.update(field, types);
   level.tight = unite(level.voxels->bounds(), field.bounds());
   return true;

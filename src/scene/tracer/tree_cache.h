@@ -77,6 +77,10 @@ struct TracedShapes {
 /// O(types and elements).
 [[nodiscard]] int reach_of_shapes(const VoxelRegistry& types);
 
+/// Returns true if the shapes, orientations or looks of shapes of any type have changed or may have changed. Textures
+/// decide which parts of shapes are visible and which are glass.
+[[nodiscard]] bool has_other_shapes(const TypeChanges& changes, const VoxelRegistry& types);
+
 /// The treatment of voxels whose type has shapes.
 enum class ShapedVoxels : std::uint8_t {
   AsCubes,  ///< transparent cubes of their type's colour
@@ -166,6 +170,7 @@ class HalvedGridCache {
   struct Entry {
     ChangeCursor followed;
     ChangeCursor followed_field;
+    ChangeCursor followed_states;  // unused if types have no shapes and are not turned
     GridPyramid pyramid;
     DensityPyramid fields;
     Grid no_voxels;

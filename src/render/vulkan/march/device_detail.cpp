@@ -36,7 +36,7 @@ void DeviceDetail::clear() {
 void DeviceDetail::look_at(const Scene& scene) {
   PendingChanges types(followed_types_, scene.types);
   PendingChanges changes(followed_scene_, scene);
-  if (has_other_visibility(*types)) clear();
+  if (has_other_visibility(*types) || has_other_shapes(*types, scene.types)) clear();
   if (changes->all || !changes->grids.empty()) impostors_.follow(scene);
   const auto is_gone = [&](GridHandle handle) { return scene.grids().find(handle) == nullptr; };
   if (changes->all || std::any_of(changes->grids.begin(), changes->grids.end(), is_gone)) {

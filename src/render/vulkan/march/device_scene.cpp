@@ -59,7 +59,7 @@ std::uint32_t side_flags(const ModelFace& face, const VoxelFace* look, const Vox
   return flags;
 }
 
-bool has_other_shapes(const TypeChanges& changes, const VoxelRegistry& types) {
+bool has_other_shaped_types(const TypeChanges& changes, const VoxelRegistry& types) {
   const auto is_other = [&](const TypeChange& change) { return change.shape_changed || types.is_shaped(change.type); };
   return changes.all || std::ranges::any_of(changes.items_unless_all(), is_other);
 }
@@ -223,7 +223,7 @@ Status DeviceScene::update_grids(const Scene& scene, const std::vector<GridHandl
 Status DeviceScene::try_update(const Scene& scene, InstanceFilter filter, Threads threads) {
   // Packing depends on the visibility of types, and on all properties of shaped ones.
   const TypeChanges types = scene.types.changes_since(followed_visibility_);
-  if (has_other_visibility(types) || (shapes_ != nullptr && has_other_shapes(types, scene.types))) {
+  if (has_other_visibility(types) || (shapes_ != nullptr && has_other_shaped_types(types, scene.types))) {
     for (auto& [handle, grid] : grids_) grid.voxels.release(*memory_);
     grids_.clear();
     followed_scene_ = {};
