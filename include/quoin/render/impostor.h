@@ -33,8 +33,8 @@ struct ImpostorOptions {
   int edge = 128;
 };
 
-/// A compact representation of a grid's opaque surface (voxels and field), made from 26 rendered views. Renderers
-/// draw it in place of the grid where the grid is small in the image.
+/// A compact representation of a grid's opaque surface (voxels, shapes and field), made from 26 rendered views.
+/// Renderers draw it in place of the grid where the grid is small in the image.
 ///
 /// Each face is drawn as it is where a pixel spans few voxels. Where a pixel spans many voxels, the surface is drawn in
 /// cells of 2, 4, 8, 16 or 32 voxels. A cell has 4^3 bits that mark the surface inside the cell. For each of the 26
@@ -43,6 +43,9 @@ struct ImpostorOptions {
 /// direction to the camera. As the distance grows, one cell size fades into the next, pixel by pixel; no image depends
 /// on earlier images. Impostors hold types, not colours: drawing uses the registry's current colours. Transparent
 /// voxels are left out; the renderer traces them.
+///
+/// Sides of shapes are stored as rectangles of their own sizes and slopes. Sides with cutouts become several rectangles,
+/// in sixteenths of a voxel. They show the means of their textures. Sides of glass are left out like transparent voxels.
 ///
 /// A field's surface is stored as pieces of its tangent planes (surfels), one per crossed edge of the sample lattice,
 /// with the normal of the traced surface.
@@ -70,7 +73,7 @@ class Impostor {
   [[nodiscard]] static Impostor build(const Grid& grid, const VoxelRegistry& types,
                                       const ImpostorOptions& options = {});
 
-  /// Renders all views of the opaque voxels and the field.
+  /// Renders all views of the opaque voxels, the shapes and the field.
   /// Cost: as above, plus two microseconds per surfel of the field and 10 ns per surfel and view.
   [[nodiscard]] static Impostor build(const SceneGrid& grid, const VoxelRegistry& types,
                                       const ImpostorOptions& options = {});
@@ -80,14 +83,17 @@ class Impostor {
   /// there are very many faces; then it processes all.
   ///
   /// Requires: this impostor was built from the grid or a snapshot of it, without a field, with types of the same
-  ///           visibility; `changes` are all changes since. Only the absence of a field is checked.
+  ///           visibility and shapes; `changes` are all changes since, and no shape has another state. Only the absence
+  ///           of a field is checked. Grids with shapes are processed whole.
   /// Cost:     about 20 ns per face, plus the parts that the edit can affect.
   [[nodiscard]] Impostor rebuilt(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) const;
 
   [[nodiscard]] const ImpostorOptions& options() const { return options_; }
-  /// Returns the sphere around all voxels of the grid, including transparent voxels, and its field.
+  /// Returns the sphere around all voxels of the grid, including transparent voxels, its shapes, which may reach out of
+  /// their voxels, and its field.
   [[nodiscard]] const ContentSphere& content() const { return content_; }
-  /// Returns the smallest box of the grid around the opaque voxels and the opaque part of the field.
+  /// Returns the smallest box of the grid around the opaque voxels, the voxels that shapes touch and the opaque part of
+  /// the field.
   [[nodiscard]] const IBox& bounds() const { return box_; }
   /// Returns true if the impostor has no face: the grid has no opaque surface, or must_be_traced() is true.
   [[nodiscard]] bool empty() const { return box_.empty(); }
@@ -112,13 +118,14 @@ class Impostor {
   std::shared_ptr<const ImpostorFaces> faces_;
 };
 
-/// One of the 26 views of a grid's opaque voxels, for custom textures and images. Rows start at the top.
+/// One of the 26 views of a grid's opaque voxels and shapes, for custom textures and images. Rows start at the top.
 struct ImpostorImage {
   /// Camera in grid coordinates, in voxels: 8 radii (radius of at least 1 voxel) from the content's centre, which it
   /// looks at. The content's sphere exactly fits the image. The image's up direction is the grid's +Y, or +X in the
   /// views from directly above and below.
   Camera camera;
-  Image colour;  ///< the types' own colours, unlit; black where no voxel is visible
+  Image colour;  ///< the types' own colours (sides of shapes: means of their textures), unlit; black where no voxel is
+                 ///< visible
   /// Distance from the camera in voxels; +infinity where no voxel is visible.
   FloatImage depth;
   /// 255 if a voxel is visible, else 0. Distinguishes black voxels from holes.

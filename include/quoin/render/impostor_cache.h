@@ -24,10 +24,10 @@ struct ImpostorCacheOptions {
 ///   cache.wait(scene, 0.0);  // once per frame, at its end
 ///
 /// Workers read snapshots of the grids, so edits never wait for them. After an edit, only the affected parts are
-/// processed (Impostor::rebuilt), and `find` returns the old impostor until the new impostor is ready. It never returns
-/// the impostor of a replaced grid or of another scene. When the cache is full, it drops the least recently used
-/// impostors. Impostors requested within one round, which ends with `wait`, never replace each other; requests that do
-/// not fit get no impostor.
+/// processed (Impostor::rebuilt), and `find` returns the old impostor until the new impostor is ready. Grids with shapes
+/// are processed whole, also if the state of a shape has changed. `find` never returns the impostor of a replaced grid
+/// or of another scene. When the cache is full, it drops the least recently used impostors. Impostors requested within
+/// one round, which ends with `wait`, never replace each other; requests that do not fit get no impostor.
 ///
 /// Lifetime: shares impostors with its callers; the scene is read only during calls.
 /// Threads:  any number can call at once, as long as no thread edits the scene at the same time.
@@ -51,8 +51,8 @@ class ImpostorCache {
   /// Without a time limit, the calling thread also builds. Returns the number of grids that still wait.
   std::size_t wait(const Scene& scene, double seconds = std::numeric_limits<double>::infinity());
 
-  /// Requests rebuilds of impostors with types that have become transparent or opaque since the build; `find` does this
-  /// too.
+  /// Requests rebuilds of impostors with types that have become transparent or opaque since the build, or whose shapes
+  /// have changed; `find` does this too.
   /// Cost: O(types that changed).
   void update_types(const VoxelRegistry& types);
 

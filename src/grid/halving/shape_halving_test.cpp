@@ -23,7 +23,7 @@ std::int64_t count(const Grid& grid, VoxelType type) {
   return found;
 }
 
-bool are_equal(const Grid& a, const Grid& b) {
+bool have_equal_states(const Grid& a, const Grid& b) {
   bool is_equal = a.voxel_count() == b.voxel_count() && a.data_count() == b.data_count();
   a.for_each([&](IVec3 voxel, VoxelType type) {
     is_equal = is_equal && b.get(voxel) == type && b.data(voxel).state == a.data(voxel).state;
@@ -117,11 +117,11 @@ TEST(ShapeHalving, CubesStayAsTheyAre) {
              t.stone);
   }
   const Grid before = *downsample(grid, plain);
-  EXPECT_TRUE(are_equal(*downsample(grid, types), before));
+  EXPECT_TRUE(have_equal_states(*downsample(grid, types), before));
   grid.set({60, 60, 60}, t.torch);
   Grid after = *downsample(grid, types);
   after.set({30, 30, 30}, kAir);
-  EXPECT_TRUE(are_equal(after, before)) << "a shape changes its own cell only";
+  EXPECT_TRUE(have_equal_states(after, before)) << "a shape changes its own cell only";
 }
 
 TEST(ShapeHalving, TypesOfHalvedGridsAreCubes) {
@@ -187,8 +187,8 @@ TEST(ShapeHalving, PyramidFollowsEditsOfShapesAndStates) {
   for (int step = 0; step < 4; ++step) {
     pyramid.update(grid, types, 2);
     const Grid once = *downsample(grid, types);
-    ASSERT_TRUE(are_equal(pyramid.level(1), once)) << step;
-    ASSERT_TRUE(are_equal(pyramid.level(2), *downsample(once, types_of_halved(types)))) << step;
+    ASSERT_TRUE(have_equal_states(pyramid.level(1), once)) << step;
+    ASSERT_TRUE(have_equal_states(pyramid.level(2), *downsample(once, types_of_halved(types)))) << step;
     edit(20);
   }
 }

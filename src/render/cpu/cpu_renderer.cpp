@@ -71,7 +71,6 @@ class Tile {
   void take_sample(int sample);
   void take_block(int x, int y, const RayPacket& rays, int sample);
   [[nodiscard]] std::uint32_t lanes_through_glass(const RayPacket& rays, const SceneHits& hits) const;
-  static void put_on_shape(const ShapeModel& model, std::int16_t face, const Vec3& normal, SurfacePoint& point);
   void add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight);
   // The effect of glass on a ray.
   struct Sight {
@@ -93,7 +92,6 @@ class Tile {
   void fill_in(const Ray& ray, const GlassBody& body, const DVec3& normal, SurfacePoint& point) const;
   // Adds a point for the caller to fill in; its light counts with `weight` in that pixel.
   SurfacePoint& add_point(std::size_t pixel, Vec3 weight);
-  void turn_by_state(const VoxelRegistry& types, SurfacePoint& point) const;
   void light_points();
 
   const TileContext* context_;
@@ -229,20 +227,11 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
   if (point.in_field) {
     point.position = far_faces_.start_of_light(i, point.position);
     point.lift = ImpostorFaces::kSurfelLift;
+  } else if ((far_faces_.in_shape >> lane & 1U) != 0) {
+    point.position = far_faces_.on_shape(i, point.position);
   }
   point.type = far_faces_.face[i]->type;
   point.openness = openness_of(*far_faces_.face[i], context_->options->light.occlusion_mode, point.position);
-}
-
-// Sets the side of a shape that a point shows. Corrects the rounding of its position.
-void Tile::put_on_shape(const ShapeModel& model, std::int16_t face, const Vec3& normal, SurfacePoint& point) {
-  point.model = &model;
-  point.shape_face = face;
-  point.normal = normal;
-  point.is_tilted = normal != Vec3(normal_of(point.face));
-  if (point.is_tilted) return;
-  const int axis = frame_of(point.face).axis;
-  point.position[axis] = double{model.faces[static_cast<std::size_t>(face)].corners[0][axis]} + point.voxel[axis];
 }
 
 Tile::Sight Tile::add_transparent(const Ray& ray, double max_t, std::size_t pixel) {
@@ -349,14 +338,6 @@ SurfacePoint& Tile::add_point(std::size_t pixel, Vec3 weight) {
   return added;
 }
 
-// Turns the textures of a cube that is seen in full detail.
-void Tile::turn_by_state(const VoxelRegistry& types, SurfacePoint& point) const {
-  const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(point.placed)];
-  if (placed.level != 0 || point.is_far || !types.is_opaque(point.type)) return;
-  const std::uint32_t state = placed.voxels->data(point.voxel).state;
-  point.orientation = static_cast<std::uint8_t>(types[point.type].orientations.of(state).index());
-}
-
 void Tile::light_points() {
   const BlockVector<PlacedGrid>& placed = placed_in(context_->view->tracer());
   const VoxelRegistry& types = context_->view->tracer().scene().types;
@@ -371,7 +352,9 @@ void Tile::light_points() {
       reader.emplace(*placed[static_cast<std::size_t>(known)].voxels);
     }
     if (point.type == kAir) point.type = reader->get(point.voxel);
-    if (has_turned && types.is_turned_by_state(point.type)) turn_by_state(types, point);
+    if (has_turned && types.is_turned_by_state(point.type)) {
+      turn_by_state(placed[static_cast<std::size_t>(known)], types, point);
+    }
   }
   QUOIN_ASSERT(targets_.size() == points_.size(), "one target per point");
   lit_.resize(points_.size());

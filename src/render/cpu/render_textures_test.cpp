@@ -201,6 +201,35 @@ TEST(RenderTextures, ShowsMeansOfFacesFarAway) {
   }
 }
 
+// Faces of cubes that their state turns keep their mean far away.
+TEST(RenderTextures, ShowsMeansOfTurnedFacesFarAway) {
+  Scene scene;
+  std::array<VoxelFace, 6> faces;
+  for (std::size_t i = 0; i < faces.size(); ++i) faces[i].texture = random_texture(16, static_cast<unsigned>(i));
+  VoxelProperties properties{.state_bits = 2, .orientations = StateOrientations::about_y()};
+  properties.faces = VoxelFaces(faces);
+  const VoxelType type = scene.types.add(properties).value();
+  Grid grid;
+  grid.fill_box({{-8, -8, -8}, {8, 8, 8}}, type);
+  grid.for_each([&](IVec3 voxel, VoxelType) { grid.set_data(voxel, {.state = 1}); });
+  place(scene, std::move(grid));
+  RenderOptions halved = unlit(5, 5);
+  halved.detail.policy =
+      DetailPolicy{.rule = DetailPolicy::Rule::ByPixels, .voxel_pixels = 1e6, .cell_pixels = 1e6, .far_pixels = 0};
+  RenderOptions far = unlit(32, 32);
+  far.detail.policy = DetailPolicy{.far_pixels = 1000};
+  const AxisOrientation back = properties.orientations.of(1).inverse();
+  for (const Direction direction : kDirections) {
+    const Direction unturned = back.apply(direction);
+    const VoxelFace& face = scene.types[type].faces[unturned];
+    const Pixel expected = shown(face, unturned, DVec3(0.5), face.texture.level_count() - 1);
+    EXPECT_EQ(pixel_at(taken(scene, facing(direction, DVec3(0.3), 1.0), halved), 2, 2), expected)
+        << name_of(direction) << ", halved";
+    EXPECT_EQ(pixel_at(taken(scene, facing(direction, DVec3(0.3), 32.0), far), 16, 16), expected)
+        << name_of(direction) << ", impostor";
+  }
+}
+
 TEST(RenderTextures, ShowsMeansOfCoarseGrids) {
   Scene scene;
   const VoxelType type = place_box(scene, random_texture(16, 5), {{-64, 0, -64}, {64, 2, 64}});

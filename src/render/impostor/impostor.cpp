@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 
 #include <quoin/core/assert.h>
 #include <quoin/core/memory.h>
@@ -33,7 +35,8 @@ std::size_t ImpostorFaces::bytes() const {
            (level.reach[0].size() + level.slope[0].size()) * 2 * sizeof(float) +
            level.groups.views.size() * (6 * sizeof(float) + sizeof(std::uint32_t)) + level.cells.size() * sizeof(Cell);
   };
-  std::size_t sum = sizeof(*this) + faces.size() * sizeof(Face) + surfels.size() * sizeof(Surfel) + of_level(unseen);
+  std::size_t sum = sizeof(*this) + faces.size() * sizeof(Face) + surfels.size() * sizeof(Surfel) +
+                    shapes.size() * sizeof(ShapeSide) + of_level(unseen);
   for (const Level& level : levels) sum += of_level(level);
   return sum;
 }
@@ -83,72 +86,148 @@ std::uint8_t packed(const FaceOcclusion& corners) {
 
 constexpr double kOcclusionReach = LightOptions{}.occlusion_distance_voxels;
 
-// Returns a point in front of a surfel's middle, in the grid.
-DVec3 place_of(const ImpostorFaces::Face& face, const ImpostorFaces::Surfel& surfel, double lift) {
-  return surfel.middle(DVec3(face.voxel) + lift * DVec3(surfel.normal), face.direction);
+// Returns a point in front of a face, in the grid. `u` and `v`: -1 to 1 from one side of the face to the other.
+DVec3 place_of(const ImpostorFaces& impostor, std::uint32_t index, double u = 0.0, double v = 0.0) {
+  constexpr double kLift = 0.01;
+  const ImpostorFaces::Face& face = impostor.faces[index];
+  const FaceFrame& frame = frame_of(face.direction);
+  if (!impostor.has_surfel(index)) {
+    DVec3 place = DVec3(face.voxel) + 0.5 + (0.5 + kLift) * DVec3(normal_of(face.direction));
+    place[frame.u] += 0.5 * u;
+    place[frame.v] += 0.5 * v;
+    return place;
+  }
+  const ImpostorFaces::Surfel& surfel = impostor.surfel_of(index);
+  DVec3 place = surfel.middle(DVec3(face.voxel) + kLift * DVec3(surfel.normal), face.direction);
+  u *= surfel.half[0], v *= surfel.half[1];
+  place[frame.u] += u;
+  place[frame.v] += v;
+  place[frame.axis] += u * surfel.slope[0] + v * surfel.slope[1];
+  return place;
 }
 
-// Returns a mask; bit i is set if ray i meets a voxel or the field.
-std::uint32_t blocked_by(const OccupancyTree& opaque, const DensityTree* field, const RayPacket& rays) {
-  const std::uint32_t blocked = any_hits(opaque, rays);
+// Returns true if a point lies inside a box of a shape.
+bool is_inside(const ShapesAtVoxel& shapes, const DVec3& point) {
+  return std::ranges::any_of(shapes, [&](const PlacedShape& shape) {
+    return std::ranges::any_of(shape.model->boxes, [&](const ModelBox& box) {
+      DVec3 at = point - DVec3(shape.voxel);
+      if (box.is_turned) {
+        const DVec3 from = at - DVec3(box.origin);
+        for (int axis = 0; axis < 3; ++axis)
+          at[axis] = glm::dot(DVec3(box.inverse[static_cast<std::size_t>(axis)]), from);
+      }
+      return glm::all(glm::greaterThan(at, DVec3(box.min))) && glm::all(glm::lessThan(at, DVec3(box.max)));
+    });
+  });
+}
+
+// Returns a mask; bit i is set if ray i meets a voxel, a shape or the field.
+std::uint32_t blocked_by(const SolidVoxels& solid, const DensityTree* field, const RayPacket& rays) {
+  const std::uint32_t blocked = solid.any_hits(rays);
   if (field == nullptr) return blocked;
   RayPacket rest = rays;
   rest.active &= ~blocked;
   return blocked | any_hits(*field, rest);
 }
 
-// Sets the directions of one of the occlusion rays of each face at `wanted`.
-void set_directions(const OcclusionDirections& directions, int ray, std::span<const std::uint32_t> wanted,
-                    const ImpostorFaces& impostor, RayPacket& rays) {
-  QUOIN_ASSERT(wanted.size() <= RayPacket::kSize, "a face per lane");
-  for (std::size_t i = 0; i < wanted.size(); ++i) {
-    const ImpostorFaces::Face& face = impostor.faces[wanted[i]];
-    // Faces of a field's surface use the values of an upper face, rotated with it.
-    const auto side = static_cast<std::size_t>(face.in_field ? Direction::PosY : face.direction);
-    DVec3 direction = directions.fixed(side, ray);
-    if (face.in_field) direction = turned_from_up(direction, DVec3(impostor.surfel_of(wanted[i]).normal));
-    rays.direction_x[i] = direction.x, rays.direction_y[i] = direction.y, rays.direction_z[i] = direction.z;
+// Counts the occlusion rays of faces that reach open space, for up to sixteen faces at a time.
+class OpenRays {
+ public:
+  OpenRays(const SolidVoxels& solid, const DensityTree* field, ImpostorFaces& impostor)
+      : solid_(&solid), field_(field), impostor_(&impostor), directions_(kRays) {
+    if (solid.shapes != nullptr) shapes_.emplace(solid.shapes->index);
+    rays_.max_t.fill(kOcclusionReach);
   }
-}
 
-// Counts the rays of OcclusionDirections that reach open space from the middle of each face at `wanted`. Handles
-// sixteen faces at a time, mostly of one direction.
-void count_open_rays(const OccupancyTree& opaque, const DensityTree* field, std::span<const std::uint32_t> wanted,
-                     ImpostorFaces& impostor) {
-  BlockVector<ImpostorFaces::Face>& faces = impostor.faces;
-  constexpr double kLift = 0.01;
-  constexpr int kRays = ImpostorFaces::Face::kRays;
-  const OcclusionDirections directions(kRays);
-  RayPacket rays;
-  rays.max_t.fill(kOcclusionReach);
-  for (std::size_t begin = 0; begin < wanted.size(); begin += RayPacket::kSize) {
-    const std::size_t size = std::min<std::size_t>(RayPacket::kSize, wanted.size() - begin);
-    rays.active = (1U << size) - 1U;
-    for (std::size_t i = 0; i < size; ++i) {
-      const ImpostorFaces::Face& face = faces[wanted[begin + i]];
-      const DVec3 origin = face.in_field ? place_of(face, impostor.surfel_of(wanted[begin + i]), kLift)
-                                         : DVec3(face.voxel) + 0.5 + (0.5 + kLift) * DVec3(normal_of(face.direction));
-      rays.origin_x[i] = origin.x, rays.origin_y[i] = origin.y, rays.origin_z[i] = origin.z;
-    }
-    const ImpostorFaces::Face& first = faces[wanted[begin]];
-    const bool is_one_side = std::ranges::all_of(wanted.subspan(begin, size), [&](std::uint32_t i) {
-      return !faces[i].in_field && faces[i].direction == first.direction;
-    });
+  void count(std::span<const std::uint32_t> faces) {
+    QUOIN_ASSERT(faces.size() <= RayPacket::kSize, "a face per lane");
+    place(faces);
     std::array<int, RayPacket::kSize> open{};
+    std::array<int, RayPacket::kSize> counted{};
     for (int ray = 0; ray < kRays; ++ray) {
-      if (is_one_side) {
-        const DVec3 direction = directions.fixed(static_cast<std::size_t>(first.direction), ray);
-        rays.direction_x.fill(direction.x), rays.direction_y.fill(direction.y), rays.direction_z.fill(direction.z);
-      } else {
-        set_directions(directions, ray, wanted.subspan(begin, size), impostor, rays);
+      aim(faces, ray);
+      rays_.active = (1U << faces.size()) - 1U;
+      if (before_shapes_ != 0) spread(faces, ray);
+      const std::uint32_t blocked = blocked_by(*solid_, field_, rays_);
+      for (std::size_t i = 0; i < faces.size(); ++i) {
+        open[i] += static_cast<int>((rays_.active & ~blocked) >> i & 1U);
+        counted[i] += static_cast<int>(rays_.active >> i & 1U);
       }
-      const std::uint32_t blocked = blocked_by(opaque, field, rays);
-      for (std::size_t i = 0; i < size; ++i) open[i] += (blocked >> i & 1U) == 0;
     }
-    for (std::size_t i = 0; i < size; ++i) {
-      QUOIN_ASSERT(open[i] >= 0 && open[i] <= kRays, "at most all rays");
-      faces[wanted[begin + i]].open_rays = static_cast<std::uint8_t>(open[i] & 15);
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      QUOIN_ASSERT(open[i] <= counted[i] && counted[i] <= kRays, "at most all rays");
+      const int of_all = counted[i] == 0 ? 0 : (2 * kRays * open[i] + counted[i]) / (2 * counted[i]);
+      impostor_->faces[faces[i]].open_rays = static_cast<std::uint8_t>(of_all & 15);
     }
+  }
+
+ private:
+  static constexpr int kRays = ImpostorFaces::Face::kRays;
+  static_assert(kRays == 9, "a square of places");
+
+  void place(std::span<const std::uint32_t> faces) {
+    const ImpostorFaces::Face& first = impostor_->faces[faces[0]];
+    before_shapes_ = 0;
+    is_one_side_ = true;
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      const DVec3 origin = place_of(*impostor_, faces[i]);
+      set_origin(origin, i);
+      if (shapes_ && !shapes_->at(voxel_of(origin)).empty()) before_shapes_ |= 1U << i;
+      is_one_side_ &= !impostor_->has_surfel(faces[i]) && impostor_->faces[faces[i]].direction == first.direction;
+    }
+  }
+
+  void aim(std::span<const std::uint32_t> faces, int ray) {
+    if (is_one_side_) {
+      const auto side = static_cast<std::size_t>(impostor_->faces[faces[0]].direction);
+      const DVec3 direction = directions_.fixed(side, ray);
+      rays_.direction_x.fill(direction.x), rays_.direction_y.fill(direction.y), rays_.direction_z.fill(direction.z);
+      return;
+    }
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      const ImpostorFaces::Face& face = impostor_->faces[faces[i]];
+      // Faces of a field's surface and inclined sides of shapes use the values of an upper face, rotated with it.
+      const bool is_inclined =
+          impostor_->has_surfel(faces[i]) && (face.in_field || impostor_->surfel_of(faces[i]).is_inclined());
+      DVec3 direction =
+          directions_.fixed(static_cast<std::size_t>(is_inclined ? Direction::PosY : face.direction), ray);
+      if (is_inclined) direction = turned_from_up(direction, DVec3(impostor_->surfel_of(faces[i]).normal));
+      rays_.direction_x[i] = direction.x, rays_.direction_y[i] = direction.y, rays_.direction_z[i] = direction.z;
+    }
+  }
+
+  // Shapes may cover the middles of the faces behind them: each ray starts at another place of such a face, and does not
+  // count if that is inside a shape.
+  void spread(std::span<const std::uint32_t> faces, int ray) {
+    constexpr double kStep = 2.0 / 3.0;
+    for (std::uint32_t left = before_shapes_; left != 0; left &= left - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(left));
+      const DVec3 origin = place_of(*impostor_, faces[i], kStep * (ray % 3 - 1), kStep * (ray / 3 - 1));
+      set_origin(origin, i);
+      if (is_inside(shapes_->at(voxel_of(origin)), origin)) rays_.active &= ~(1U << i);
+    }
+  }
+
+  void set_origin(const DVec3& origin, std::size_t lane) {
+    rays_.origin_x[lane] = origin.x, rays_.origin_y[lane] = origin.y, rays_.origin_z[lane] = origin.z;
+  }
+
+  const SolidVoxels* solid_;
+  const DensityTree* field_;
+  ImpostorFaces* impostor_;
+  OcclusionDirections directions_;
+  std::optional<ShapeIndex::Reader> shapes_;
+  RayPacket rays_;
+  std::uint32_t before_shapes_ = 0;  // lanes of faces with shapes in front
+  bool is_one_side_ = true;          // all faces are of voxels and have one direction
+};
+
+// Counts the open rays of each face at `wanted`; mostly of one direction.
+void count_open_rays(const SolidVoxels& solid, const DensityTree* field, std::span<const std::uint32_t> wanted,
+                     ImpostorFaces& impostor) {
+  OpenRays rays(solid, field, impostor);
+  for (std::size_t begin = 0; begin < wanted.size(); begin += RayPacket::kSize) {
+    rays.count(wanted.subspan(begin, std::min<std::size_t>(RayPacket::kSize, wanted.size() - begin)));
   }
 }
 
@@ -180,46 +259,81 @@ class KnownFaces {
 
 // The input for a grid's impostor.
 struct Subject {
-  const Grid* grid;
-  const VoxelRegistry* types;
-  const OccupancyTree* opaque;
+  SolidVoxels solid;
   const DensityTree* field;  // the opaque part of the grid's field; null: none
   ContentSphere content;
   IBox box;  // of the drawn content
   int edge = 0;
   int first_width = 0;                 // see ImpostorFaces
   std::optional<ImpostorShell> shell;  // none if there are too many faces
-  FieldSurfels surfels;
+  SurfacePieces pieces;                // of field and shapes; those of shapes come later if there is no shell
   bool must_be_traced = false;
 
-  Subject(const Grid& of_grid, const VoxelRegistry& of_types, const OccupancyTree& tree, const DensityTree* of_field,
-          const IBox& whole, const ImpostorOptions& options)
-      : grid(&of_grid), types(&of_types), opaque(&tree), field(of_field) {
+  Subject(const SolidVoxels& voxels, const DensityTree* of_field, const IBox& whole, const ImpostorOptions& options)
+      : solid(voxels), field(of_field) {
     content = content_sphere(whole);
-    box = unite(tree.bounds(), field == nullptr ? IBox{} : field->field().bounds());
+    box = unite(solid.bounds(), field == nullptr ? IBox{} : field->field().bounds());
     if (box.empty()) return;
     edge = edge_for(content, options);
     // Above this, one ray per texel takes less time.
     const std::int64_t max_faces = std::int64_t{kImpostorViews} * edge * edge;
-    shell = ImpostorShell::build(tree, kMaxVoxels, max_faces);
+    shell = ImpostorShell::build(*solid.opaque, kMaxVoxels, max_faces);
+    if (shell) take_shapes(static_cast<std::size_t>(max_faces));
     if (!shell) first_width = first_width_for(content, edge);
     if (field == nullptr) return;
     auto found = surfels_of(field->field(), static_cast<std::size_t>(max_faces));
     must_be_traced = !shell || !found;
-    if (found) surfels = std::move(*found);
+    if (!found) return;
+    found->add(std::move(pieces));
+    pieces = std::move(*found);
   }
 
   [[nodiscard]] bool occludes(IVec3 voxel, GridReader& reader) const {
-    if (!shell || types->has_unoccluding()) return types->occludes(reader.get(voxel));
+    // The shell knows the voxels around its own; shapes may lie elsewhere.
+    const IBox& known = solid.opaque->bounds();
+    const bool is_outside = solid.shapes != nullptr && !IBox{known.min - 1, known.max + 1}.contains(voxel);
+    if (!shell || is_outside || solid.types->has_unoccluding()) return solid.types->occludes(reader.get(voxel));
     return shell->is_occupied(voxel);
+  }
+
+ private:
+  // Drops the shell if the shapes have too many pieces.
+  void take_shapes(std::size_t max_pieces) {
+    if (solid.shapes == nullptr) return;
+    std::size_t count = 0;
+    for (const IVec3 chunk : solid.shapes->index.chunks()) {
+      solid.shapes->index.for_each_in(chunk, [&](const PlacedShape&) { ++count; });
+    }
+    if (count <= max_pieces) {
+      pieces = pieces_of_shapes(*solid.shapes, *solid.grid, *solid.types, [](IVec3) { return true; });
+    }
+    if (std::max(count, pieces.faces.size()) <= max_pieces) return;
+    pieces = {};
+    shell.reset();
   }
 };
 
+// Returns all faces with the views that see them. Adds the pieces of shapes if rays find the faces.
+BlockVector<SeenFace> faces_seen(Subject& subject) {
+  if (subject.shell) {
+    return faces_seen_of(*subject.shell, subject.pieces, subject.box, subject.content, subject.edge);
+  }
+  MetShapes met;
+  BlockVector<SeenFace> seen = faces_seen_by_rays(subject.solid, subject.content, subject.edge, met);
+  if (subject.solid.shapes == nullptr) return seen;
+  subject.pieces = pieces_of_shapes(*subject.solid.shapes, *subject.solid.grid, *subject.solid.types,
+                                    [&](IVec3 voxel) { return met.contains(voxel); });
+  add_pieces_seen(subject.pieces, met, seen);
+  return seen;
+}
+
 void put_faces(const Subject& subject, const BlockVector<SeenFace>& seen, KnownFaces known, ImpostorFaces& out) {
-  GridReader reader(*subject.grid);
-  GridReader neighbours(*subject.grid);
+  GridReader reader(*subject.solid.grid);
+  GridReader neighbours(*subject.solid.grid);
   std::vector<std::uint32_t> fresh;
-  out.surfels = subject.surfels.surfels;
+  out.surfels = subject.pieces.surfels;
+  out.shapes = subject.pieces.shapes;
+  if (!out.shapes.empty()) out.types = *subject.solid.types;
   out.faces.reserve(seen.size());
   for (const SeenFace& each : seen) {
     ImpostorFaces::Face& face = out.faces.emplace_back();
@@ -231,17 +345,20 @@ void put_faces(const Subject& subject, const BlockVector<SeenFace>& seen, KnownF
     face.voxel = each.face.voxel;
     face.direction = each.face.direction;
     if (each.surfel != nullptr) {
-      face.in_field = true;
-      face.type = subject.surfels.types[static_cast<std::size_t>(each.surfel - subject.surfels.surfels.data())];
-      continue;
+      const auto piece = static_cast<std::size_t>(each.surfel - subject.pieces.surfels.data());
+      face.type = subject.pieces.types[piece];
+      face.in_field = !each.in_shape;
+      // Only sides of shapes that lie on a side of their voxel have corners of voxels.
+      if (face.in_field || !subject.pieces.shapes[piece].on_side()) continue;
+    } else {
+      face.type = reader.get(face.voxel);
     }
-    face.type = reader.get(face.voxel);
     face.occlusion = packed(
         corner_occlusion([&](IVec3 voxel) { return subject.occludes(voxel, neighbours); }, face.voxel, face.direction));
   }
   QUOIN_ASSERT(out.faces.size() == seen.size() && out.surfels.size() <= seen.size(),
                "one entry per face, and its surfels last");
-  count_open_rays(*subject.opaque, subject.field, fresh, out);
+  count_open_rays(subject.solid, subject.field, fresh, out);
 }
 
 bool is_full(const OccupancyTree& tree, const IBox& box) {
@@ -257,20 +374,21 @@ bool is_full(const OccupancyTree& tree, const IBox& box) {
 
 void put_levels(const Subject& subject, const BlockVector<SeenFace>& seen, ImpostorFaces& out) {
   const auto is_solid = [&](const IBox& box) {
-    return subject.shell ? subject.shell->is_full(box) : is_full(*subject.opaque, box);
+    return subject.shell ? subject.shell->is_full(box) : is_full(*subject.solid.opaque, box);
   };
   std::size_t level = 0;
   int width = subject.first_width;  // log2
   if (width == 0) {
     out.levels[level++] = seen_faces(seen, subject.content);
+    const auto in_field = [](const SeenFace& face) { return face.surfel != nullptr && !face.in_shape; };
     out.unseen =
-        subject.surfels.surfels.empty()
+        std::ranges::none_of(seen, in_field)
             ? unseen_faces(seen, subject.content)
             : SurfaceCells::behind(seen, subject.field->field(), subject.content, subject.edge).level(is_solid);
     ++width;
   }
   SurfaceCells cells(seen, subject.content, subject.edge, width);
-  if (!subject.shell) cells.fill_from(*subject.opaque);
+  if (!subject.shell) cells.fill_from(*subject.solid.opaque);
   for (; level < out.levels.size(); ++level) {
     out.levels[level] = cells.level(is_solid);
     cells.halve();
@@ -281,12 +399,23 @@ std::shared_ptr<const ImpostorFaces> faces_of(const Subject& subject, const Bloc
                                               KnownFaces known) {
   auto faces = std::make_shared<ImpostorFaces>();
   faces->edge = subject.edge;
-  faces->is_whole = subject.shell.has_value() && subject.field == nullptr;
+  faces->is_whole = subject.shell.has_value() && subject.field == nullptr && subject.solid.shapes == nullptr;
   faces->centre = subject.content.centre;
   faces->first_width = subject.first_width;
   put_levels(subject, seen, *faces);
   put_faces(subject, seen, std::move(known), *faces);
   return faces;
+}
+
+// Returns true if a changed chunk has shapes.
+bool adds_shapes(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) {
+  if (!types.has_shapes()) return false;
+  const std::vector<IVec3> chunks = changes.chunks(grid);
+  return std::ranges::any_of(chunks, [&](IVec3 at) {
+    const Chunk* const chunk = grid.find_chunk(at);
+    return chunk != nullptr &&
+           std::ranges::any_of(chunk->types(), [&](VoxelType type) { return types.is_shaped(type); });
+  });
 }
 
 // Returns boxes around the changes if they are small enough for the remaining faces to be reused.
@@ -314,7 +443,10 @@ std::optional<std::vector<IBox>> small_boxes(const GridChanges& changes, const I
 Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque,
                          const DensityTree* field, const IBox& whole, const ImpostorOptions& options) {
   QUOIN_ASSERT(options.edge >= 16 && options.edge <= 1024, "16 to 1,024 texels");
-  const Subject subject(grid, types, opaque, field, whole, options);
+  TreeCache shaped(ShapedVoxels::ByShape);
+  if (types.has_shapes()) shaped.update(grid, types);
+  const SolidVoxels solid{&grid, &types, &opaque, shaped.shapes()};
+  Subject subject(solid, field, unite(whole, solid.bounds()), options);
   Impostor made;
   made.options_ = options;
   made.content_ = subject.content;
@@ -322,9 +454,11 @@ Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const Occ
   if (made.must_be_traced_) return made;
   made.box_ = subject.box;
   if (made.empty()) return made;
-  const BlockVector<SeenFace> seen =
-      subject.shell ? faces_seen_of(*subject.shell, subject.surfels, made.box_, subject.content, subject.edge)
-                    : faces_seen_by_rays(opaque, subject.content, subject.edge);
+  const BlockVector<SeenFace> seen = faces_seen(subject);
+  if (seen.empty()) {  // only shapes of glass
+    made.box_ = {};
+    return made;
+  }
   made.faces_ = faces_of(subject, seen, {});
   return made;
 }
@@ -344,10 +478,11 @@ Impostor Impostor::build(const SceneGrid& grid, const VoxelRegistry& types, cons
 
 Impostor Impostor::rebuilt(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) const {
   if (changes.empty()) return *this;
-  QUOIN_ASSERT(faces_->surfels.empty(), "an impostor without a field");
+  QUOIN_ASSERT(faces_->surfels.size() == faces_->shapes.size(), "an impostor without a field");
   const OccupancyTree opaque = OccupancyTree::build(grid, types, Occupancy::Opaque);
+  if (adds_shapes(grid, types, changes)) return build(grid, types, opaque, options_);
   const std::optional<std::vector<IBox>> changed = small_boxes(changes, opaque.bounds());
-  const Subject subject(grid, types, opaque, nullptr, grid.bounds(), options_);
+  const Subject subject({&grid, &types, &opaque}, nullptr, grid.bounds(), options_);
   const bool is_comparable = !empty() && changed && faces_->is_whole && subject.shell && subject.edge == faces_->edge &&
                              subject.content.centre == content_.centre && subject.content.radius == content_.radius;
   if (!is_comparable) return build(grid, types, opaque, options_);

@@ -14,6 +14,7 @@
 #include "core/caches.h"
 #include "core/moved_from.h"
 #include "core/work/workers.h"
+#include "scene/tracer/tree_cache.h"
 
 namespace quoin {
 namespace {
@@ -22,7 +23,8 @@ namespace {
 struct Origin {
   ChangeCursor grid;
   ChangeCursor field;
-  std::uint64_t types = 0;  // counter of transparency changes of types
+  ChangeCursor data;        // of the grid; only used if types have shapes
+  std::uint64_t types = 0;  // counter of changes of types that impostors show
   int edge = 0;
 };
 
@@ -50,7 +52,7 @@ struct Entry {
   std::size_t refused_bytes = 0;  // size of the last impostor, refused for lack of room
 
   // Returns the origin of the newest impostor: waiting, being built or complete; null if none.
-  [[nodiscard]] const Origin* newest() const {
+  [[nodiscard]] Origin* newest() {
     if (waiting) return &waiting->origin;
     return building ? &*building : impostor != nullptr ? &origin : nullptr;
   }
@@ -65,6 +67,7 @@ struct ImpostorCache::Impl {
 
   void look_at(const VoxelRegistry& types);
   void ask(Entry& entry, GridHandle handle, const SceneGrid& grid, int edge);
+  [[nodiscard]] bool has_other_shapes(const Grid& grid, ChangeCursor& followed) const;
   GridChanges changes_of(Entry& entry, const BuildInput& job);
   void start_workers();
   [[nodiscard]] Workers::Clock::time_point step(Workers::Lock& lock);
@@ -87,7 +90,7 @@ struct ImpostorCache::Impl {
   std::uint64_t built_bytes = 0;
   ChangeCursor followed_types;
   std::shared_ptr<const VoxelRegistry> types;
-  std::uint64_t types_changed = 0;  // counter of transparency changes of types
+  std::uint64_t types_changed = 0;  // counter of changes of types that impostors show
   std::uint64_t round = 0;          // incremented at each wait
   // Impostors replaced while a caller held them. A worker frees them, because that takes time.
   std::vector<std::shared_ptr<const Impostor>> replaced;
@@ -97,11 +100,32 @@ struct ImpostorCache::Impl {
 
 void ImpostorCache::Impl::look_at(const VoxelRegistry& now) {
   PendingChanges changes(followed_types, now);
-  if (has_other_visibility(*changes)) {
+  if (has_other_visibility(*changes) || quoin::has_other_shapes(*changes, now)) {
     types = std::make_shared<const VoxelRegistry>(now);
     ++types_changed;
   }
   changes.commit();
+}
+
+// Returns true if the data of a voxel with a shape has changed. Otherwise moves the cursor to the present.
+bool ImpostorCache::Impl::has_other_shapes(const Grid& grid, ChangeCursor& followed) const {
+  if (types == nullptr || !types->has_shapes() || !grid.has_data_changed_since(followed)) return false;
+  ChangeCursor now = followed;
+  const DataChanges changes = grid.data_changes_since(now);
+  if (changes.all) return true;
+  for (const DataChange& change : changes.items_unless_all()) {
+    const Chunk* const chunk = grid.find_chunk(change.chunk);
+    if (chunk == nullptr) continue;
+    for (int z = change.box.min.z; z < change.box.max.z; ++z) {
+      for (int y = change.box.min.y; y < change.box.max.y; ++y) {
+        for (int x = change.box.min.x; x < change.box.max.x; ++x) {
+          if (types->is_shaped(chunk->get(x, y, z))) return true;
+        }
+      }
+    }
+  }
+  followed = now;
+  return false;
 }
 
 // Queues the grid's present state; replaces an older state in the queue.
@@ -110,7 +134,9 @@ void ImpostorCache::Impl::ask(Entry& entry, GridHandle handle, const SceneGrid& 
   BuildInput job;
   job.grid.grid = grid.grid.snapshot();
   job.grid.field = grid.field.snapshot();
-  job.origin = {grid.grid.cursor(), grid.field.cursor(), types_changed, edge};
+  ChangeCursor data;
+  if (types->has_shapes()) (void)job.grid.grid.data_changes_since(data);
+  job.origin = {grid.grid.cursor(), grid.field.cursor(), data, types_changed, edge};
   job.types = types;
   job.changes = changes_of(entry, job);
   const bool is_new = !entry.waiting.has_value();
@@ -135,7 +161,11 @@ GridChanges ImpostorCache::Impl::changes_of(Entry& entry, const BuildInput& job)
   }
   // Grids that have or had a field are rebuilt from scratch.
   const bool has_field = job.grid.field.chunk_count() != 0 || !of_samples.empty();
-  if (base->types == types_changed && base->edge == job.origin.edge && !has_field) changes = std::move(since);
+  ChangeCursor of_data = base->data;
+  if (base->types == types_changed && base->edge == job.origin.edge && !has_field &&
+      !has_other_shapes(job.grid.grid, of_data)) {
+    changes = std::move(since);
+  }
   return changes;
 }
 
@@ -314,10 +344,11 @@ std::shared_ptr<const Impostor> ImpostorCache::find(const Scene& scene, GridHand
   impl_of(impl_).look_at(scene.types);
   Entry& entry = impl_of(impl_).entries[grid];
   entry.last_use = impl_of(impl_).round;
-  const Origin* newest = entry.newest();
+  Origin* newest = entry.newest();
   const bool is_current = newest != nullptr && newest->types == impl_of(impl_).types_changed &&
                           newest->edge == options.edge && !named->grid.has_changed_since(newest->grid) &&
-                          !named->field.has_changed_since(newest->field);
+                          !named->field.has_changed_since(newest->field) &&
+                          !impl_of(impl_).has_other_shapes(named->grid, newest->data);
   if (!is_current) impl_of(impl_).ask(entry, grid, *named, options.edge);
   return entry.impostor;
 }

@@ -51,6 +51,23 @@ std::vector<std::int32_t> placed_of(const SceneTracer& tracer, std::span<const F
   return indices;
 }
 
+DVec3 FarFaces::on_shape(std::size_t lane, DVec3 point) const {
+  QUOIN_ASSERT(surfel[lane] != nullptr && (in_shape >> lane & 1U) != 0, "a lane that found a piece of a shape");
+  constexpr double kRim = 1e-6;  // as in `on_face`
+  const ImpostorFaces::Surfel& piece = *surfel[lane];
+  const FaceFrame& frame = frame_of(face[lane]->direction);
+  const DVec3 middle = piece.middle(DVec3(face[lane]->voxel), face[lane]->direction);
+  double rise = 0.0;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const auto axis = static_cast<int>(k == 0 ? frame.u : frame.v);
+    const double reach = std::max(piece.half[k] - kRim, 0.0);
+    point[axis] = std::clamp(point[axis], middle[axis] - reach, middle[axis] + reach);
+    rise += piece.slope[k] * (point[axis] - middle[axis]);
+  }
+  point[frame.axis] = middle[frame.axis] + rise;
+  return point;
+}
+
 ImpostorPass::ImpostorPass(const SceneTracer& tracer, std::span<const FarInstance> far, const Camera& camera, int width,
                            int height)
     : width_(width),
@@ -157,7 +174,7 @@ double ImpostorPass::distance_to_surfel(const DrawnImpostor& drawn, const Impost
 
 void ImpostorPass::find(int column, int row, const RayPacket& rays, const raster::Canvas& canvas, SceneHits& hits,
                         FarFaces& faces) const {
-  faces.found = 0;
+  faces.found = faces.in_shape = 0;
   const std::size_t first = raster::index_of(column % kTile, row % kTile);
   for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
     const int lane = std::countr_zero(left);
@@ -190,7 +207,13 @@ void ImpostorPass::find(int column, int row, const RayPacket& rays, const raster
     hits.placed[i] = drawn.placed;
     hits.in_field &= ~bit;
     hits.in_shape &= ~bit;
-    faces.surfel[i] = face.in_field ? &drawn.faces->surfel_of(number) : nullptr;
+    faces.surfel[i] = drawn.faces->has_surfel(number) ? &drawn.faces->surfel_of(number) : nullptr;
+    if (const ImpostorFaces::ShapeSide* const shape = drawn.faces->shape_of(number); shape != nullptr) {
+      hits.shapes[i] = {t,         face.voxel,  shape->model,   faces.surfel[i]->normal,
+                        face.type, shape->face, face.direction, false};
+      hits.in_shape |= bit;
+      faces.in_shape |= bit;
+    }
     if (face.in_field) {
       const Vec3 normal = faces.surfel[i]->normal;
       hits.normal_x[i] = normal.x, hits.normal_y[i] = normal.y, hits.normal_z[i] = normal.z;
@@ -211,7 +234,13 @@ class FarTile {
  public:
   FarTile(const ImpostorPass& pass, const SceneView& view, const CameraRays& rays, const Lighting& lighting,
           OcclusionMode mode, RenderedImage& image)
-      : pass_(&pass), view_(&view), rays_(&rays), lighting_(&lighting), mode_(mode), image_(&image) {}
+      : pass_(&pass),
+        view_(&view),
+        types_(&view.tracer().scene().types),
+        rays_(&rays),
+        lighting_(&lighting),
+        mode_(mode),
+        image_(&image) {}
 
   void draw(int column, int row) {
     pass_->draw(column, row, 0, *far_);
@@ -261,10 +290,16 @@ class FarTile {
         point.position = faces.start_of_light(i, point.position);
         point.lift = ImpostorFaces::kSurfelLift;
         point.is_blended = true;
+      } else if ((faces.in_shape >> lane & 1U) != 0) {
+        put_on_shape(*hits.shapes[i].model, hits.shapes[i].face, hits.shapes[i].normal, point);
+        point.position = faces.on_shape(i, point.position);
       } else {
         point.position = on_face(point.position, point.voxel, point.face);
       }
       point.type = faces.face[i]->type;
+      if (types_->is_turned_by_state(point.type)) {
+        turn_by_state(placed_in(view_->tracer())[static_cast<std::size_t>(point.placed)], *types_, point);
+      }
       point.openness = openness_of(*faces.face[i], mode_, point.position);
       pixels_.push_back(pixel);
     }
@@ -272,6 +307,7 @@ class FarTile {
 
   const ImpostorPass* pass_;
   const SceneView* view_;
+  const VoxelRegistry* types_;
   const CameraRays* rays_;
   const Lighting* lighting_;
   OcclusionMode mode_;
@@ -296,7 +332,8 @@ void draw_impostors(const SceneTracer& scene, std::span<const FarInstance> far, 
   const Surfaces surfaces(types);
   Lighting lighting(view, types, surfaces, options.light, environment);
   const CameraRays rays(camera, options.width, options.height);
-  if (types.has_textures()) lighting.show_textures(glm::length(rays.down()), rays.is_perspective());
+  if (types.has_textures() || types.has_shapes())
+    lighting.show_textures(glm::length(rays.down()), rays.is_perspective());
   const ImpostorPass pass(scene, far, camera, options.width, options.height);
   const int across = (options.width + kTile - 1) / kTile;
   const int down = (options.height + kTile - 1) / kTile;

@@ -25,12 +25,15 @@ struct FarFaces {
   std::uint32_t found = 0;
   RayPacket::Lanes<const ImpostorFaces::Face*> face{};
   RayPacket::Lanes<const ImpostorFaces::Surfel*> surfel{};  ///< null: the face is a voxel's
+  std::uint32_t in_shape = 0;                               ///< lanes whose surfel is a piece of a shape
 
   /// Returns the start of light rays for a point on a lane's surfel, in the grid.
   [[nodiscard]] DVec3 start_of_light(std::size_t lane, const DVec3& point) const {
     QUOIN_ASSERT(surfel[lane] != nullptr && face[lane] != nullptr, "a lane that found a surfel");
     return surfel[lane]->start_of_light(point, DVec3(face[lane]->voxel), face[lane]->direction);
   }
+  /// Moves a point onto a lane's piece of a shape, as `on_face` does for a voxel. `point`: in the grid.
+  [[nodiscard]] DVec3 on_shape(std::size_t lane, DVec3 point) const;
 };
 
 /// The far instances of one image: the tiles where each may be visible, and the hits of rays on them.
@@ -49,7 +52,7 @@ class ImpostorPass {
   void draw(int column, int row, int sample, raster::Canvas& canvas) const;
 
   /// Replaces `hits` by nearer hits on far instances, for the 4x4 pixels from (`column`, `row`), whose rays from the
-  /// camera are `rays_in_view`. Hits report the faces and voxels used for lighting.
+  /// camera are `rays_in_view`. Hits report the faces and voxels used for lighting, and the sides of shapes.
   /// Requires: `canvas` belongs to the tile.
   void find(int column, int row, const RayPacket& rays_in_view, const raster::Canvas& canvas, SceneHits& hits,
             FarFaces& faces) const;

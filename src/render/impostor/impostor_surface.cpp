@@ -183,6 +183,37 @@ BlockVector<ShellFace> ImpostorShell::faces() const {
   return all;
 }
 
+void SurfacePieces::add(SurfacePieces&& of_shapes) {
+  QUOIN_ASSERT(shapes.empty() && of_shapes.shapes.size() == of_shapes.faces.size(), "a field's pieces, and shapes'");
+  if (of_shapes.faces.empty()) return;
+  shapes.resize(faces.size());
+  const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+  append(faces, of_shapes.faces);
+  append(surfels, of_shapes.surfels);
+  append(types, of_shapes.types);
+  append(shapes, of_shapes.shapes);
+  sort();
+}
+
+void SurfacePieces::sort() {
+  std::vector<std::uint32_t> order(faces.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const auto is_flat = [&](std::uint32_t i) { return in_shape(i) && !surfels[i].is_inclined(); };
+  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return is_flat(a) != is_flat(b) ? is_flat(a) : comes_before(faces[a], faces[b]);
+  });
+  const auto put_in_order = [&](auto& list) {
+    if (list.empty()) return;
+    auto sorted = list;
+    for (std::size_t i = 0; i < order.size(); ++i) sorted[i] = list[order[i]];
+    list = std::move(sorted);
+  };
+  put_in_order(faces);
+  put_in_order(surfels);
+  put_in_order(types);
+  put_in_order(shapes);
+}
+
 namespace {
 
 constexpr double kOfLargest = 0.8;
@@ -218,18 +249,9 @@ class SurfelMaker {
 
   [[nodiscard]] bool is_thin() const { return 4 * thin_ > made_.faces.size(); }
 
-  FieldSurfels sorted() && {
-    std::vector<std::uint32_t> order(made_.faces.size());
-    std::iota(order.begin(), order.end(), 0U);
-    std::sort(order.begin(), order.end(),
-              [&](std::uint32_t a, std::uint32_t b) { return comes_before(made_.faces[a], made_.faces[b]); });
-    FieldSurfels out;
-    for (const std::uint32_t i : order) {
-      out.faces.push_back(made_.faces[i]);
-      out.surfels.push_back(made_.surfels[i]);
-      out.types.push_back(made_.types[i]);
-    }
-    return out;
+  SurfacePieces sorted() && {
+    made_.sort();
+    return std::move(made_);
   }
 
  private:
@@ -347,13 +369,13 @@ class SurfelMaker {
   const DensityGrid* field_;
   std::size_t max_count_;
   std::array<const DensityChunk*, 4> near_{};
-  FieldSurfels made_;
+  SurfacePieces made_;
   std::size_t thin_ = 0;
 };
 
 }  // namespace
 
-std::optional<FieldSurfels> surfels_of(const DensityGrid& field, std::size_t max_count) {
+std::optional<SurfacePieces> surfels_of(const DensityGrid& field, std::size_t max_count) {
   std::vector<IVec3> chunks;
   for (const IVec3 chunk : field.chunks()) {
     chunks.push_back(chunk);

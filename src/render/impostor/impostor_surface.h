@@ -7,12 +7,14 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
+#include <quoin/core/function_ref.h>
 #include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/trace/occupancy_tree.h>
 
 #include "render/impostor/raster/impostor_faces.h"
+#include "scene/tracer/tree_cache.h"
 
 namespace quoin {
 
@@ -65,11 +67,18 @@ class ImpostorShell {
   std::vector<std::uint64_t> cells_;
 };
 
-/// The surface of a field in pieces: a face for each surfel, and a material.
-struct FieldSurfels {
+/// The surface of a field and of shapes in pieces: a face for each surfel, a type, and a shape's side if there are any.
+/// Order: the axis-aligned ones, then the inclined ones; by `comes_before`.
+struct SurfacePieces {
   BlockVector<ShellFace> faces;
   BlockVector<ImpostorFaces::Surfel> surfels;
   std::vector<VoxelType> types;
+  BlockVector<ImpostorFaces::ShapeSide> shapes;  ///< empty without shapes
+
+  [[nodiscard]] bool in_shape(std::size_t i) const { return !shapes.empty() && shapes[i].model != nullptr; }
+  /// Adds pieces of shapes to those of a field.
+  void add(SurfacePieces&& of_shapes);
+  void sort();
 };
 
 /// Returns all surfels of a field, sorted by `comes_before`. Returns nullopt if there would be more than `max_count`,
@@ -80,6 +89,16 @@ struct FieldSurfels {
 ///         and there is no gap.
 /// Normal: the normal of the traced surface.
 /// Cost:   about a microsecond per surfel.
-[[nodiscard]] std::optional<FieldSurfels> surfels_of(const DensityGrid& field, std::size_t max_count);
+[[nodiscard]] std::optional<SurfacePieces> surfels_of(const DensityGrid& field, std::size_t max_count);
+
+/// Returns the sides of all shapes of a grid that hide the background (ShapeParts::Visible), sorted. Sides that
+/// neighbours cover are left out.
+///
+/// Pieces: a rectangle for each side that is one along the axes of its direction. Other sides, and cutout ones, are cut
+///         into rectangles of sixteenths of a voxel, whose middles decide. `is_wanted`: selects voxels with shapes.
+/// Back:   sides that are seen from behind, through cutouts or missing sides, have pieces for both directions.
+/// Cost:   about 100 ns per piece. Memory: pieces of plants with cutouts are 10 to 50 for a voxel.
+[[nodiscard]] SurfacePieces pieces_of_shapes(const TracedShapes& shapes, const Grid& grid, const VoxelRegistry& types,
+                                             FunctionRef<bool(IVec3 voxel)> is_wanted);
 
 }  // namespace quoin

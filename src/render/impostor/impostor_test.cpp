@@ -140,7 +140,7 @@ TEST(Impostor, MatchesSingleRays) {
   const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
   GridReader reader(grid);
   for (int view = 0; view < kImpostorViews; ++view) {
-    const Snapshot snapshot = take_snapshot(grid, types, tree, view);
+    const Snapshot snapshot = take_snapshot({&grid, &types, &tree}, view);
     for (std::size_t i = 0; i < snapshot.types.size(); i += 37) {
       const Ray ray = ray_of_texel(snapshot.camera, static_cast<int>(i % 128), static_cast<int>(i / 128));
       const auto hit = first_hit(tree, ray);
@@ -176,7 +176,7 @@ TEST(Impostor, ShowsBlackVoxels) {
   grid.fill_box({{0, 0, 0}, {10, 10, 10}}, 1);
   const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
   for (int view = 0; view < kImpostorViews; ++view) {
-    const Snapshot snapshot = take_snapshot(grid, types, tree, view);
+    const Snapshot snapshot = take_snapshot({&grid, &types, &tree}, view);
     for (int y = 60; y < 68; ++y) {
       for (int x = 60; x < 68; ++x) EXPECT_EQ(snapshot.types[static_cast<std::size_t>(y * 128 + x)], 1);
     }
@@ -190,7 +190,7 @@ TEST(Impostor, IsEmptyForEmptyGrid) {
   EXPECT_TRUE(Impostor::build(grid, types).empty());
   const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
   for (int view = 0; view < kImpostorViews; ++view) {
-    const Snapshot snapshot = take_snapshot(grid, types, tree, view);
+    const Snapshot snapshot = take_snapshot({&grid, &types, &tree}, view);
     ASSERT_EQ(snapshot.types.size(), 128U * 128U);
     EXPECT_TRUE(std::all_of(snapshot.types.begin(), snapshot.types.end(), [](auto type) { return type == kAir; }));
     EXPECT_TRUE(std::all_of(snapshot.depth.begin(), snapshot.depth.end(), [](auto d) { return d == kInfinity; }));
@@ -208,7 +208,7 @@ TEST(Impostor, CropsNothingInAnyView) {
     }
     const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
     for (int view = 0; view < kImpostorViews; ++view) {
-      const Snapshot snapshot = take_snapshot(grid, types, tree, view);
+      const Snapshot snapshot = take_snapshot({&grid, &types, &tree}, view);
       EXPECT_NE(std::count(snapshot.types.begin(), snapshot.types.end(), VoxelType{2}), 0) << round << " " << view;
       for (std::size_t i = 0; i < 128; ++i) {  // no snapshot is cropped
         ASSERT_LE(snapshot.types[i] + snapshot.types[128 * i] + snapshot.types[128 * i + 127], round == 0 ? 6 : 3);
@@ -375,8 +375,8 @@ TEST(ImpostorDeathTest, RejectsInvalidViewsAndEdges) {
   const Grid grid = blobs(1);
   const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
   QUOIN_EXPECT_MISTAKE(static_cast<void>(impostor_view(kImpostorViews)), "index < kImpostorViews");
-  QUOIN_EXPECT_MISTAKE(static_cast<void>(take_snapshot(grid, types, tree, -1)), "view >= 0");
-  QUOIN_EXPECT_MISTAKE(static_cast<void>(take_snapshot(grid, types, tree, 0, 0)), "edge >= 1");
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(take_snapshot({&grid, &types, &tree}, -1)), "view >= 0");
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(take_snapshot({&grid, &types, &tree}, 0, 0)), "edge >= 1");
   QUOIN_EXPECT_MISTAKE(static_cast<void>(Impostor::build(grid, types, ImpostorOptions{8})), "edge >= 16");
 }
 

@@ -26,9 +26,21 @@ ImpostorFaces::Level level_of(const BlockVector<SeenFace>& faces, const ContentS
   LevelMaker maker(content);
   maker.reserve(static_cast<std::size_t>(
       std::count_if(faces.begin(), faces.end(), [&](const SeenFace& face) { return views_of(face) != 0; })));
-  for (std::size_t i = 0; i < faces.size(); ++i) {
+  const auto add = [&](std::size_t i) {
     const std::uint32_t views = views_of(faces[i]);
     if (views != 0) maker.add(rectangle_of(faces[i], content.centre), views, static_cast<std::uint32_t>(i));
+  };
+  const auto of_voxels =
+      std::ranges::partition_point(faces, [](const SeenFace& face) { return face.surfel == nullptr; });
+  const auto count = static_cast<std::size_t>(of_voxels - faces.begin());
+  std::size_t voxel_face = 0;
+  std::size_t piece = count;
+  for (std::size_t side = 0; side < kSides; ++side) {
+    const auto is_on = [&](const SeenFace& face) {
+      return static_cast<std::size_t>(face.face.direction) + (face.is_inclined() ? kSides / 2 : 0) == side;
+    };
+    for (; piece < faces.size() && is_on(faces[piece]); ++piece) add(piece);
+    for (; voxel_face < count && is_on(faces[voxel_face]); ++voxel_face) add(voxel_face);
   }
   return std::move(maker).level();
 }
@@ -41,10 +53,10 @@ Rectangle rectangle_of(const SeenFace& seen, DVec3 centre) {
   const ImpostorFaces::Surfel* const surfel = seen.surfel;
   Rectangle out;
   out.direction = direction;
-  out.is_inclined = surfel != nullptr;
+  out.is_inclined = seen.is_inclined();
   for (std::size_t k = 0; surfel != nullptr && k < 2; ++k) {
     out.slope[k] = surfel->slope[k];
-    out.reach[k] = surfel->half[k] + ImpostorFaces::kSurfelRoom;
+    out.reach[k] = surfel->half[k] + (seen.in_shape ? 0.0F : ImpostorFaces::kSurfelRoom);
   }
   for (int axis = 0; axis < 3; ++axis) {
     const bool is_along = axis == frame.axis;
@@ -278,16 +290,21 @@ struct FaceHash {
 // Collects faces that rays meet.
 class MetFaces {
  public:
-  void take(const OccupancyTree& opaque, const ContentSphere& content, int view, int edge) {
+  void take(const SolidVoxels& solid, const ContentSphere& content, int view, int edge, MetShapes& shapes) {
     const SnapshotCamera camera = snapshot_camera(content, view, edge);
-    const TexelArea area = texels_of(camera, opaque.bounds(), edge);
+    const TexelArea area = texels_of(camera, solid.bounds(), edge);
     PacketHits hits;
+    RayPacket::Lanes<ShapeHit> in_shapes;
     for (int row = area.top; row < area.bottom; row += kTexelBlock) {
       for (int column = area.left; column < area.right; column += kTexelBlock) {
-        first_hits(opaque, rays_of_texels(camera, edge, column, row), hits);
+        const std::uint32_t of_shapes = solid.first_hits(rays_of_texels(camera, edge, column, row), hits, in_shapes);
         for (std::uint32_t left = hits.hit; left != 0; left &= left - 1) {
           const int lane = std::countr_zero(left);
           const auto i = static_cast<std::size_t>(lane);
+          if ((of_shapes >> lane & 1U) != 0) {
+            shapes[in_shapes[i].voxel] |= 1U << view;
+            continue;
+          }
           SeenFace& seen = at({{hits.x[i], hits.y[i], hits.z[i]}, hits.face[i]});
           seen.views |= 1U << view;
         }
@@ -311,7 +328,7 @@ class MetFaces {
   SeenFace& at(const ShellFace& face) {
     if (last_ < faces_.size() && faces_[last_].face == face) return faces_[last_];
     const auto [found, is_new] = index_.try_emplace(face, static_cast<std::uint32_t>(faces_.size()));
-    if (is_new) faces_.push_back({face, nullptr, 0});
+    if (is_new) faces_.push_back({face, nullptr, 0, false});
     last_ = found->second;
     return faces_[last_];
   }
@@ -347,11 +364,13 @@ BlockVector<SeenFace> sorted(const BlockVector<SeenFace>& faces, IVec3 least) {
 
 }  // namespace
 
-BlockVector<SeenFace> faces_seen_of(const ImpostorShell& shell, const FieldSurfels& field, const IBox& box,
+BlockVector<SeenFace> faces_seen_of(const ImpostorShell& shell, const SurfacePieces& pieces, const IBox& box,
                                     const ContentSphere& content, int edge) {
-  QUOIN_ASSERT(field.surfels.size() == field.faces.size(), "one surfel per face");
+  QUOIN_ASSERT(pieces.surfels.size() == pieces.faces.size(), "one surfel per face");
   BlockVector<SeenFace> faces = unseen_of(shell);
-  for (std::size_t i = 0; i < field.faces.size(); ++i) faces.push_back({field.faces[i], &field.surfels[i], 0});
+  for (std::size_t i = 0; i < pieces.faces.size(); ++i) {
+    faces.push_back({pieces.faces[i], &pieces.surfels[i], 0, pieces.in_shape(i)});
+  }
   const ImpostorFaces::Level level = all_faces(faces, content);
   raster::Canvas canvas;
   for (int view = 0; view < kImpostorViews; ++view) {
@@ -384,11 +403,25 @@ BlockVector<SeenFace> faces_seen_after(const ImpostorFaces& before, const Impost
   return now;
 }
 
-BlockVector<SeenFace> faces_seen_by_rays(const OccupancyTree& opaque, const ContentSphere& content, int edge) {
+BlockVector<SeenFace> faces_seen_by_rays(const SolidVoxels& solid, const ContentSphere& content, int edge,
+                                         MetShapes& shapes) {
   MetFaces met;
-  for (int view = 0; view < kImpostorViews; ++view) met.take(opaque, content, view, edge);
-  met.add_neighbours(opaque);
-  return sorted(std::move(met).faces(), opaque.bounds().min);
+  for (int view = 0; view < kImpostorViews; ++view) met.take(solid, content, view, edge, shapes);
+  met.add_neighbours(*solid.opaque);
+  return sorted(std::move(met).faces(), solid.opaque->bounds().min);
+}
+
+void add_pieces_seen(const SurfacePieces& pieces, const MetShapes& met, BlockVector<SeenFace>& faces) {
+  for (std::size_t i = 0; i < pieces.faces.size(); ++i) {
+    const auto found = met.find(pieces.faces[i].voxel);
+    QUOIN_ASSERT(found != met.end(), "pieces of shapes that rays met");
+    std::uint32_t views = 0;
+    for (std::uint32_t left = found->second; left != 0; left &= left - 1) {
+      const int view = std::countr_zero(left);
+      if (glm::dot(impostor_view(view), DVec3(pieces.surfels[i].normal)) > 0.0) views |= 1U << view;
+    }
+    faces.push_back({pieces.faces[i], &pieces.surfels[i], views, true});
+  }
 }
 
 }  // namespace quoin

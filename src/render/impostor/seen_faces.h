@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <span>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/trace/occupancy_tree.h>
 
+#include "core/coordinates/chunk_order.h"
 #include "render/impostor/impostor_surface.h"
 #include "render/impostor/raster/impostor_faces.h"
 #include "render/impostor/snapshot.h"
@@ -26,13 +28,17 @@ struct SeenFace {
   ShellFace face;
   const ImpostorFaces::Surfel* surfel = nullptr;  ///< null: a voxel face
   std::uint32_t views = 0;
+  bool in_shape = false;  ///< the surfel is a piece of a shape
+
+  /// Returns true if its rectangle has a slope. Fields' surfels always count as inclined.
+  [[nodiscard]] bool is_inclined() const { return surfel != nullptr && (!in_shape || surfel->is_inclined()); }
 };
 
-/// Returns all faces of a shell and of a field with their visibility in the 26 snapshots of `edge` texels per side:
-/// sorted by side, neighbours mostly together. `field` must outlive the result.
+/// Returns all faces of a shell, then the pieces of field and shapes, with their visibility in the 26 snapshots of
+/// `edge` texels per side. Order: as in ImpostorShell::faces and SurfacePieces. `pieces` must outlive the result.
 ///
 /// Source: all faces drawn from each view. Cost: about 10 ns per face and view.
-[[nodiscard]] BlockVector<SeenFace> faces_seen_of(const ImpostorShell& shell, const FieldSurfels& field,
+[[nodiscard]] BlockVector<SeenFace> faces_seen_of(const ImpostorShell& shell, const SurfacePieces& pieces,
                                                   const IBox& box, const ContentSphere& content, int edge);
 
 /// Updates the faces after an edit. `before`: an impostor with the same content and edge, and complete faces.
@@ -42,13 +48,20 @@ struct SeenFace {
 [[nodiscard]] BlockVector<SeenFace> faces_seen_after(const ImpostorFaces& before, const ImpostorShell& shell,
                                                      const ContentSphere& content, std::span<const IBox> changed);
 
-/// Returns the faces that one ray per texel meets, and faces that share an edge with one of them (slivers between the
-/// rays). Works for any number of faces. Cost: about 0.15 microseconds per covered texel.
-[[nodiscard]] BlockVector<SeenFace> faces_seen_by_rays(const OccupancyTree& opaque, const ContentSphere& content,
-                                                       int edge);
+/// The shapes that rays meet: the views that see each shape, by its voxel.
+using MetShapes = std::map<IVec3, std::uint32_t, ByZyx>;
 
-/// Returns the level of the faces that any view saw. Level::face indexes `faces`, which are sorted by direction, voxel
-/// faces first.
+/// Returns the faces that one ray per texel meets, and faces that share an edge with one of them (slivers between the
+/// rays). Works for any number of faces. `shapes`: receives the shapes that rays meet. Cost: about 0.15 microseconds per
+/// covered texel, 1 microsecond with shapes.
+[[nodiscard]] BlockVector<SeenFace> faces_seen_by_rays(const SolidVoxels& solid, const ContentSphere& content, int edge,
+                                                       MetShapes& shapes);
+/// Appends all pieces of shapes that rays met, each seen by the views that it faces among those that met its shape.
+/// `pieces` must outlive the result.
+void add_pieces_seen(const SurfacePieces& pieces, const MetShapes& met, BlockVector<SeenFace>& faces);
+
+/// Returns the level of the faces that any view saw. Level::face indexes `faces`, which are in the order of
+/// `faces_seen_of`. Of equally near faces of one direction, pieces of shapes come first.
 [[nodiscard]] ImpostorFaces::Level seen_faces(const BlockVector<SeenFace>& faces, const ContentSphere& content);
 
 /// Returns the level of the faces that no view saw, as if every view had seen them.

@@ -10,7 +10,9 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/srgb.h"
 #include "render/light/corner_light.h"
+#include "scene/surfaces.h"
 
 namespace quoin {
 namespace {
@@ -131,31 +133,41 @@ RayPacket rays_of_texels(const SnapshotCamera& camera, int edge, int column, int
   return rays;
 }
 
-Snapshot take_snapshot(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque, int view, int edge) {
+Snapshot take_snapshot(const SolidVoxels& solid, int view, int edge) {
   QUOIN_ASSERT(view >= 0 && view < kImpostorViews);
   QUOIN_ASSERT(edge >= 1 && edge <= 4096);
   const auto texels = static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge);
   Snapshot snapshot;
-  snapshot.camera = snapshot_camera(content_sphere(grid), view, edge);
+  const IBox bounds = solid.bounds();
+  snapshot.camera = snapshot_camera(content_sphere(unite(solid.grid->bounds(), bounds)), view, edge);
   snapshot.edge = edge;
   snapshot.types.assign(texels, kAir);
   snapshot.faces.assign(texels, Direction::PosX);
   snapshot.occlusion.assign(texels, 0);
   snapshot.depth.assign(texels, std::numeric_limits<float>::infinity());
-  if (opaque.bounds().empty()) return snapshot;
-  GridReader reader(grid);
+  if (bounds.empty()) return snapshot;
+  if (solid.shapes != nullptr) snapshot.shapes.resize(texels);
+  GridReader reader(*solid.grid);
   PacketHits hits;
-  const TexelArea area = texels_of(snapshot.camera, opaque.bounds(), edge);
+  RayPacket::Lanes<ShapeHit> in_shapes;
+  const TexelArea area = texels_of(snapshot.camera, bounds, edge);
   for (int row = area.top; row < area.bottom; row += kTexelBlock) {
     for (int column = area.left; column < area.right; column += kTexelBlock) {
       const RayPacket rays = rays_of_texels(snapshot.camera, edge, column, row);
-      first_hits(opaque, rays, hits);
+      const std::uint32_t of_shapes = solid.first_hits(rays, hits, in_shapes);
       for (std::uint32_t left = hits.hit; left != 0; left &= left - 1) {
         const int lane = std::countr_zero(left);
         const Ray ray = rays.ray(lane);
         const RayHit hit = hits[lane];
         const auto texel = static_cast<std::size_t>((row + lane / kTexelBlock) * edge + column + lane % kTexelBlock);
-        const FaceOcclusion corners = corner_occlusion(reader, types, hit.voxel, hit.face);
+        FaceOcclusion corners{};
+        bool has_corners = true;
+        if ((of_shapes >> lane & 1U) != 0) {
+          const ShapeHit& shape = in_shapes[static_cast<std::size_t>(lane)];
+          snapshot.shapes[texel] = {shape.model, shape.face};
+          has_corners = snapshot.shapes[texel].on_side();
+        }
+        if (has_corners) corners = corner_occlusion(reader, *solid.types, hit.voxel, hit.face);
         const float occlusion = occlusion_at(corners, hit.voxel, hit.face, ray.origin + ray.direction * hit.t);
         snapshot.types[texel] = reader.get(hit.voxel);
         snapshot.faces[texel] = hit.face;
@@ -188,7 +200,12 @@ ImpostorImage rendered_of(const Snapshot& snapshot, const VoxelRegistry& types) 
   for (std::size_t i = 0; i < texels; ++i) {
     const VoxelType type = snapshot.types[i];
     if (type == kAir) continue;
-    const Rgba8 colour = type < types.size() ? types[type].colour : unknown;
+    Rgba8 colour = type < types.size() ? types[type].colour : unknown;
+    if (!snapshot.shapes.empty() && snapshot.shapes[i].face >= 0) {
+      const auto [model, face] = snapshot.shapes[i];
+      const VoxelFace* const look = look_of(*model, model->faces[static_cast<std::size_t>(face)], types[type].faces);
+      if (look != nullptr) colour = srgb_colour(mean_colour(*look));
+    }
     image.coverage[i] = 255;
     image.colour.rgb[3 * i] = colour.r, image.colour.rgb[3 * i + 1] = colour.g;
     image.colour.rgb[3 * i + 2] = colour.b;
@@ -200,10 +217,12 @@ ImpostorImage rendered_of(const Snapshot& snapshot, const VoxelRegistry& types) 
 
 std::vector<ImpostorImage> impostor_images(const Grid& grid, const VoxelRegistry& types, const ImpostorOptions& options,
                                            Threads threads) {
-  const OccupancyTree opaque = OccupancyTree::build(grid, types, Occupancy::Opaque);
+  TreeCache trees(ShapedVoxels::ByShape);
+  trees.update(grid, types);
+  const SolidVoxels solid{&grid, &types, &trees.opaque(), trees.shapes()};
   std::vector<ImpostorImage> images(kImpostorViews);
   parallel_for(images.size(), threads, [&](std::size_t view) {
-    images[view] = rendered_of(take_snapshot(grid, types, opaque, static_cast<int>(view), options.edge), types);
+    images[view] = rendered_of(take_snapshot(solid, static_cast<int>(view), options.edge), types);
   });
   return images;
 }

@@ -40,33 +40,57 @@ std::uint32_t hash_of(const ShellFace& face) {
   return mix_bits(hash ^ static_cast<std::uint32_t>(face.voxel.z));
 }
 
+// As above; pieces of one shape differ.
+std::uint32_t hash_of(const SeenFace& seen) {
+  std::uint32_t hash = hash_of(seen.face);
+  if (!seen.in_shape) return hash;
+  for (const float part : {seen.surfel->offset, seen.surfel->shift[0], seen.surfel->shift[1]}) {
+    hash = mix_bits(hash ^ std::bit_cast<std::uint32_t>(part));
+  }
+  return hash;
+}
+
 // Ranks of faces for the views that saw them.
 class Ranks {
  public:
   // `texel`: its width, voxels.
-  explicit Ranks(double texel) {
+  explicit Ranks(double texel) : square_texel_(texel * texel) {
     for (int view = 0; view < kImpostorViews; ++view) {
       for (const Direction direction : kDirections) {
         const double turned = std::max(glm::dot(impostor_view(view), DVec3(normal_of(direction))), 1e-3);
-        // Faces smaller than a texel are seen in proportion to their visible size, so they count alike.
-        const double texels = turned / (texel * texel);
-        const double size = texels / (1.0 - std::exp(-texels)) / std::max(1.0, 1.0 / (texel * texel));
-        // The largest faces have ranks below 2^27, smaller ones more.
-        at(static_cast<std::size_t>(view), direction) =
-            static_cast<std::uint32_t>(std::lround(4096.0 / std::max(size, 1e-3)));
+        at(static_cast<std::size_t>(view), direction) = factor(turned);
       }
     }
   }
+  // Returns the rank of a piece of a shape.
+  [[nodiscard]] std::uint32_t rank(std::uint32_t hash, std::size_t view, const ImpostorFaces::Surfel& piece) const {
+    const DVec3 normal(piece.normal);
+    const DVec3 size = glm::abs(normal);
+    const double area = 4.0 * piece.half[0] * piece.half[1] / std::max({size.x, size.y, size.z});
+    const double turned = std::max(glm::dot(impostor_view(static_cast<int>(view)), normal), 1e-3);
+    return ranked(hash, factor(std::max(turned * area, 1e-4)));
+  }
   [[nodiscard]] std::uint32_t rank(std::uint32_t hash, std::size_t view, Direction direction) const {
     QUOIN_ASSERT(view < kImpostorViews, "one of the views");
-    const std::uint64_t rank = std::uint64_t{hash} * factors_[6 * view + static_cast<std::size_t>(direction)] >> 17;
-    return static_cast<std::uint32_t>(std::min<std::uint64_t>(rank, 0x7FFF'FFFFU));
+    return ranked(hash, factors_[6 * view + static_cast<std::size_t>(direction)]);
   }
 
  private:
+  static std::uint32_t ranked(std::uint32_t hash, std::uint32_t factor) {
+    return static_cast<std::uint32_t>(std::min<std::uint64_t>(std::uint64_t{hash} * factor >> 17, 0x7FFF'FFFFU));
+  }
+  // `seen`: the visible size in a view, in square voxels.
+  [[nodiscard]] std::uint32_t factor(double seen) const {
+    // Faces smaller than a texel are seen in proportion to their visible size, so they count alike.
+    const double texels = seen / square_texel_;
+    const double size = texels / (1.0 - std::exp(-texels)) / std::max(1.0, 1.0 / square_texel_);
+    // The largest faces have ranks below 2^27, smaller ones more.
+    return static_cast<std::uint32_t>(std::lround(4096.0 / std::max(size, 1e-3)));
+  }
   [[nodiscard]] std::uint32_t& at(std::size_t view, Direction direction) {
     return factors_.at(6 * view + static_cast<std::size_t>(direction));
   }
+  double square_texel_;
   std::array<std::uint32_t, std::size_t{6} * kImpostorViews> factors_{};
 };
 
@@ -253,8 +277,43 @@ class SurfaceCells::Collector {
         const DVec3 low = glm::max(eighth, point - 0.3);
         const DVec3 high = glm::min(eighth + 0.5, point + 0.3);
         Cell& cell = add(voxel, low, high, seen, index);
-        cell.has_field = true;
+        cell.has_pieces = true;
         cell.bits |= bit_of_eighth(in_cell(voxel), eighth - DVec3(voxel), into_->log2_width_);
+      }
+    }
+  }
+
+  // Adds a piece of a shape as the eighths of voxels that lie behind it.
+  void add_shape(const SeenFace& seen, std::uint32_t index) {
+    QUOIN_ASSERT(seen.surfel != nullptr && seen.in_shape, "a piece of a shape");
+    const FaceFrame& frame = frame_of(seen.face.direction);
+    const ImpostorFaces::Surfel& surfel = *seen.surfel;
+    const DVec3 middle = surfel.middle(DVec3(seen.face.voxel), seen.face.direction);
+    DVec3 reach(0.0);
+    reach[frame.u] = surfel.half[0];
+    reach[frame.v] = surfel.half[1];
+    IVec3 at{0};  // an eighth
+    const auto [first_u, end_u] = eighths(middle[frame.u] - reach[frame.u], middle[frame.u] + reach[frame.u]);
+    const auto [first_v, end_v] = eighths(middle[frame.v] - reach[frame.v], middle[frame.v] + reach[frame.v]);
+    for (at[frame.v] = first_v; at[frame.v] < end_v; ++at[frame.v]) {
+      for (at[frame.u] = first_u; at[frame.u] < end_u; ++at[frame.u]) {
+        DVec3 low = glm::max(middle - reach, 0.5 * DVec3(at));
+        DVec3 high = glm::min(middle + reach, 0.5 * DVec3(at + 1));
+        const DVec3 from = 0.5 * (low + high) - middle;
+        const DVec3 half = 0.5 * (high - low);
+        const double height = middle[frame.axis] + from[frame.u] * surfel.slope[0] + from[frame.v] * surfel.slope[1];
+        const double rise = half[frame.u] * std::abs(surfel.slope[0]) + half[frame.v] * std::abs(surfel.slope[1]);
+        constexpr double kInside = 1e-3;  // from a side to the eighth that it belongs to
+        const double inside = height - kInside * frame.sign;
+        const auto [first, end] = eighths(inside - rise, inside + rise);
+        for (at[frame.axis] = first; at[frame.axis] < end; ++at[frame.axis]) {
+          const double bottom = 0.5 * at[frame.axis];
+          low[frame.axis] = std::clamp(height - rise, bottom, bottom + 0.5);
+          high[frame.axis] = std::clamp(height + rise, bottom, bottom + 0.5);
+          Cell& cell = add(at >> 1, low, high, seen, index);
+          cell.has_pieces = true;
+          cell.bits |= bit_of_eighth(in_cell(at >> 1), 0.5 * DVec3(at & 1), into_->log2_width_);
+        }
       }
     }
   }
@@ -273,7 +332,7 @@ class SurfaceCells::Collector {
         if (!solid.has(at)) continue;
         ++found;
         Cell& cell = add(at, DVec3(at), DVec3(at + 1), seen, index);
-        cell.has_field = true;
+        cell.has_pieces = true;
         cell.bits |= bits_of_voxel(in_cell(at), into_->log2_width_);
       }
     }
@@ -282,12 +341,19 @@ class SurfaceCells::Collector {
  private:
   [[nodiscard]] IVec3 in_cell(IVec3 voxel) const { return (voxel - into_->origin_) & ((1 << into_->log2_width_) - 1); }
 
+  // Returns the halves of voxels along an axis that an interval overlaps, at least one: the first, and after the last.
+  static std::pair<int, int> eighths(double low, double high) {
+    constexpr double kRounding = 1e-4;
+    const int first = static_cast<int>(std::floor(2.0 * low + kRounding));
+    return {first, std::max(first + 1, static_cast<int>(std::ceil(2.0 * high - kRounding)))};
+  }
+
   // `low` and `high`: of the part of the face that lies in the voxel's cell.
   Cell& add(IVec3 voxel, DVec3 low, DVec3 high, const SeenFace& seen, std::uint32_t index) {
     Cell& cell = cell_at(voxel);
     const DVec3 centre = into_->content_.centre;
     cell.low = glm::min(cell.low, Vec3(low - centre)), cell.high = glm::max(cell.high, Vec3(high - centre));
-    const std::uint32_t hash = hash_of(seen.face);
+    const std::uint32_t hash = hash_of(seen);
     if (seen.views == 0) {
       // In cells that hold only such faces, every view shows one.
       const std::uint32_t rank = kUnseen | hash >> 2;
@@ -297,7 +363,8 @@ class SurfaceCells::Collector {
     }
     for (std::uint32_t left = seen.views; left != 0; left &= left - 1) {
       const auto view = static_cast<std::size_t>(std::countr_zero(left));
-      const std::uint32_t rank = ranks_.rank(hash, view, seen.face.direction);
+      const std::uint32_t rank =
+          seen.in_shape ? ranks_.rank(hash, view, *seen.surfel) : ranks_.rank(hash, view, seen.face.direction);
       if (rank < cell.rank[view]) cell.rank[view] = rank, cell.face[view] = index;
     }
     return cell;
@@ -350,7 +417,11 @@ SurfaceCells::SurfaceCells(const BlockVector<SeenFace>& faces, const ContentSphe
   cells_.reserve(faces.size() / 4);
   for (std::size_t i = 0; i < faces.size(); ++i) {
     const auto index = static_cast<std::uint32_t>(i);
-    faces[i].surfel == nullptr ? collector.add_face(faces[i], index) : collector.add_surfel(faces[i], index);
+    if (faces[i].in_shape) {
+      collector.add_shape(faces[i], index);
+    } else {
+      faces[i].surfel == nullptr ? collector.add_face(faces[i], index) : collector.add_surfel(faces[i], index);
+    }
   }
   sort();
 }
@@ -362,10 +433,10 @@ SurfaceCells SurfaceCells::behind(const BlockVector<SeenFace>& faces, const Dens
   SolidCells solid(field);
   for (std::size_t i = 0; i < faces.size(); ++i) {
     const auto index = static_cast<std::uint32_t>(i);
-    if (faces[i].surfel != nullptr) {
+    if (faces[i].surfel != nullptr && !faces[i].in_shape) {
       collector.add_behind(faces[i], index, solid);
     } else if (faces[i].views == 0) {
-      collector.add_face(faces[i], index);
+      faces[i].in_shape ? collector.add_shape(faces[i], index) : collector.add_face(faces[i], index);
     }
   }
   cells.sort();
@@ -401,7 +472,7 @@ void SurfaceCells::halve() {
     Cell& into = cells_[count - 1];
     into.bits |= cell.bits;
     into.low = glm::min(into.low, cell.low), into.high = glm::max(into.high, cell.high);
-    into.has_field |= cell.has_field;
+    into.has_pieces |= cell.has_pieces;
     for (std::size_t view = 0; view < kImpostorViews; ++view) {
       if (cell.rank[view] < into.rank[view]) into.rank[view] = cell.rank[view], into.face[view] = cell.face[view];
     }
@@ -414,7 +485,6 @@ void SurfaceCells::fill_from(const OccupancyTree& tree) {
   TreeWords words(tree);
   const int across = 1 << (log2_width_ - 2);
   for (Cell& cell : cells_) {
-    QUOIN_ASSERT(!cell.has_field, "cells without surfels");
     const IVec3 corner = corner_of(cell);
     for (int i = 0; i < across * across * across; ++i) {
       const IVec3 in_cell{i % across, i / across % across, i / across / across};
@@ -463,7 +533,7 @@ ImpostorFaces::Cell SurfaceCells::finished(const Cell& cell) const {
 
 ImpostorFaces::Level SurfaceCells::level(FunctionRef<bool(const IBox&)> is_solid) const {
   LevelMaker maker(content_);
-  std::vector<IBox> boxes;  // of cells without a field, in voxels
+  std::vector<IBox> boxes;  // of cells without surfels, in voxels
   boxes.reserve(cells_.size());
   for (const Cell& cell : cells_) {
     boxes.push_back(
@@ -480,7 +550,7 @@ ImpostorFaces::Level SurfaceCells::level(FunctionRef<bool(const IBox&)> is_solid
       side.reach = {0.5F * (cell.high - cell.low)[frame.u], 0.5F * (cell.high - cell.low)[frame.v]};
       if (!(side.reach[0] > 0.0F && side.reach[1] > 0.0F)) continue;
       // No ray comes through solid voxels that lie against all of a side.
-      if (!cell.has_field && is_solid(layer_at(boxes[i], direction))) continue;
+      if (!cell.has_pieces && is_solid(layer_at(boxes[i], direction))) continue;
       maker.add(side, kAllImpostorViews, static_cast<std::uint32_t>(i));
     }
   }

@@ -15,7 +15,7 @@
 
 namespace quoin {
 
-/// The surface of a grid and its field in cells of 2^k voxels: 4^3 bits for each, and a box around the faces in it.
+/// The surface of a grid, its shapes and its field in cells of 2^k voxels: 4^3 bits for each, and a box around the faces in it.
 ///
 ///   +-+-+-+-+-+-+-+-+       # bits: set where a voxel with a face lies
 ///   | | | | | |#|#|#|
@@ -38,8 +38,8 @@ class SurfaceCells {
 
   /// Joins each 2x2x2 cells to one. Cost: about 20 ns per cell.
   void halve();
-  /// Gives the cells the bits and boxes of all faces that `tree` has in them. Requires: no surfels; a width of 4 at
-  /// least.
+  /// Gives the cells the bits and boxes of all faces that `tree` has in them. Requires: no surfels of a field; the
+  /// width is at least 4.
   void fill_from(const OccupancyTree& tree);
 
   /// Returns the box sides that a ray may reach from outside. `is_solid(box)` returns true if all voxels of a box are
@@ -58,7 +58,7 @@ class SurfaceCells {
     Vec3 high{0.0F};
     std::array<std::uint32_t, kImpostorViews> face{};
     std::array<std::uint32_t, kImpostorViews> rank{};
-    bool has_field = false;
+    bool has_pieces = false;  // surfels of a field or of shapes
   };
   class Collector;
 

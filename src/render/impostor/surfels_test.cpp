@@ -76,7 +76,7 @@ TEST(Surfels, MatchDepthsAndNormalsOfSurface) {
   }
   EXPECT_GT(both, 4'000);
   EXPECT_LE(sum / both, 0.04);
-  const FieldSurfels surfels = *surfels_of(field_of(Model::SmoothBall), 100'000);
+  const SurfacePieces surfels = *surfels_of(field_of(Model::SmoothBall), 100'000);
   for (std::size_t i = 0; i < surfels.faces.size(); ++i) {
     const DVec3 place = surfels.surfels[i].middle(DVec3(surfels.faces[i].voxel), surfels.faces[i].direction);
     const DVec3 out = glm::normalize(place - DVec3(20.3, 21.1, 19.7));

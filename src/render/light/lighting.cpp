@@ -52,6 +52,23 @@ DVec3 normal_at(const SurfacePoint& point) {
 
 }  // namespace
 
+void put_on_shape(const ShapeModel& model, std::int16_t face, const Vec3& normal, SurfacePoint& point) {
+  point.model = &model;
+  point.shape_face = face;
+  point.normal = normal;
+  point.is_tilted = normal != Vec3(normal_of(point.face));
+  if (point.is_tilted) return;
+  const int axis = frame_of(point.face).axis;
+  point.position[axis] = double{face_of_shape(point).corners[0][axis]} + point.voxel[axis];
+}
+
+void turn_by_state(const PlacedGrid& placed, const VoxelRegistry& types, SurfacePoint& point) {
+  // Shapes are turned already.
+  if (placed.level == 0 && !types.is_opaque(point.type)) return;
+  const std::uint32_t state = placed.voxels->data(point.voxel).state;
+  point.orientation = static_cast<std::uint8_t>(types[point.type].orientations.of(state).index());
+}
+
 // Sorts the points' indices by grid, then by face, so that most groups of sixteen have parallel rays (saves 7 % of an
 // image's time).
 std::vector<std::uint32_t> Lighting::coherent_order(std::span<const SurfacePoint> points) {
@@ -625,6 +642,10 @@ Lighting::Colours Lighting::colours_of_shape(const SurfacePoint& point) const {
   const Vec3 tint = linear_colour(look->tint);
   const float emission = emission_of(type);
   if (look->texture.is_null()) return {tint, tint * emission};
+  if (point.is_far) {
+    const Vec3 mean = mean_colour(*look);
+    return {mean, mean * emission};
+  }
   const ShapeUv at = shape_uv(face, *look, point.position - DVec3(point.voxel));
   const int log_size = look->texture.level_count() - 1;
   const int level = mipmap_level(square_spacing_at(point) * at.square_density, log_size);
@@ -634,13 +655,18 @@ Lighting::Colours Lighting::colours_of_shape(const SurfacePoint& point) const {
   return {colour, colour * emission};
 }
 
+bool Lighting::is_cell_of_shapes(const SurfacePoint& point) const {
+  return frames_[static_cast<std::size_t>(point.placed)].shows_means && !point.in_field &&
+         types_->is_shaped(point.type);
+}
+
 // Shows the texel of a point of a textured face.
 __attribute__((always_inline)) inline Vec3 Lighting::textured_colour(const FaceTexels& face,
                                                                      const SurfacePoint& point) const {
   QUOIN_ASSERT(static_cast<std::size_t>(point.placed) < frames_.size(), "one of the placed grids");
   // A return of its own: a choice of colours would cost near points 8 % more.
   if (point.is_far || frames_[static_cast<std::size_t>(point.placed)].shows_means) [[unlikely]] {
-    return face.mean();
+    return is_cell_of_shapes(point) ? surfaces_->mean_of_shapes(point.type) : face.mean();
   }
   return texel_colour(face, point);
 }
@@ -671,6 +697,10 @@ __attribute__((noinline)) Lighting::Colours Lighting::untextured_colours_at(cons
   const bool is_bare = point.in_field && point.type == kAir;
   if (!detail_surfaces_.empty() && !is_bare) return {detail_surfaces_[placed].colour, detail_surfaces_[placed].emitted};
   if (point.shape_face >= 0) return colours_of_shape(point);
+  if (is_cell_of_shapes(point)) {
+    const Vec3 mean = surfaces_->mean_of_shapes(point.type);
+    return {mean, mean * emission_of((*types_)[point.type])};
+  }
   if (point.is_blended && surfaces_->has_textures()) {
     // Cells of halved fields are larger, but textures keep their size.
     const double scale = voxels_per_cell(point.placed);

@@ -36,7 +36,7 @@ struct SurfacePoint {
   VoxelType type = kAir;
   Direction face = Direction::PosX;  ///< fields: the direction nearest to the normal
   bool in_field = false;
-  bool is_far = false;           ///< of an impostor, whose faces show the means of their textures
+  bool is_far = false;           ///< of an impostor, whose faces and shapes show the means of their textures
   bool is_blended = false;       ///< fields: a blend of the materials around, as Surfaces::blend_of_field
   bool is_tilted = false;        ///< of a shape's turned element, or inclined fluid: `normal` counts, not `face`
   std::uint8_t orientation = 0;  ///< AxisOrientation::index of a cube that its state turns
@@ -52,6 +52,13 @@ struct SurfacePoint {
   /// Returns true if `normal` counts, not `face`.
   [[nodiscard]] bool has_normal() const { return in_field || is_tilted; }
 };
+
+/// Sets the side of a shape that a point shows: an index into `model.faces`, and the normal on the side that is seen.
+/// Corrects the rounding of the position. Requires: `point.face` is the direction nearest to the normal.
+void put_on_shape(const ShapeModel& model, std::int16_t face, const Vec3& normal, SurfacePoint& point);
+/// Turns the textures of a point by its voxel's state, on cubes and cells of halved grids. Requires: the state turns the
+/// point's type; `placed` is its grid.
+void turn_by_state(const PlacedGrid& placed, const VoxelRegistry& types, SurfacePoint& point);
 
 /// The reference lighting model: a sun with shadows, an ambient term with occlusion, and emission.
 ///
@@ -138,6 +145,8 @@ class Lighting {
   // Sets the unlit colours of points, with textures or the colours of detail.
   void show_other_colours(std::span<const SurfacePoint> points, std::span<Vec3> colours) const;
   [[nodiscard]] Colours colours_of_type(const SurfacePoint& point) const;
+  // Returns true if a point lies on a cell of a halved grid that stands for shapes.
+  [[nodiscard]] bool is_cell_of_shapes(const SurfacePoint& point) const;
   [[nodiscard]] Colours colours_of_field(const SurfacePoint& point, const FieldPoint* textured) const;
   // Returns the square of the distance between samples at a point, in voxels of its grid.
   [[nodiscard]] double square_spacing_at(const SurfacePoint& point) const;

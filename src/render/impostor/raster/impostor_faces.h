@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <glm/geometric.hpp>
@@ -74,25 +75,39 @@ struct ImpostorFaces {
     std::uint8_t occlusion = 0;  ///< of the four corners, two bits each
     Direction direction : 3 = Direction::PosX;
     std::uint8_t open_rays : 4 = kRays;  ///< number of open occlusion rays from the face's middle
-    bool in_field : 1 = false;           ///< a surfel: `direction` is the axis direction nearest to its normal
+    bool in_field : 1 = false;           ///< of a field: `direction` is the axis direction nearest to its normal
     static constexpr int kRays = 9;
   };
 
   /// Height of light ray starts above a surfel, because it is flat and the surface is curved.
   static constexpr float kSurfelLift = 0.5F;
 
+  /// The side of a shape that a face shows.
+  struct ShapeSide {
+    const ShapeModel* model = nullptr;  ///< null: the face is of a field
+    std::int16_t face = -1;             ///< index into `model->faces`
+
+    /// Returns true if it lies on a side of its voxel.
+    [[nodiscard]] bool on_side() const { return face >= 0 && model->faces[static_cast<std::size_t>(face)].on_side; }
+  };
+
   /// A piece of a field's surface at its crossing with an edge of the sample lattice. It is part of the plane through
   /// the crossing: half a sample to each side of the edge, or less if the surface ends sooner, at a sharp edge or the
   /// foot of a wall. `Face::voxel` is the edge's lower end, `direction` runs along the edge. So the surfels of one
   /// direction lie side by side like the lattice edges.
+  ///
+  /// Also a piece of a shape's side: `Face::voxel` is the voxel of the shape, `direction` the one nearest to the normal.
+  /// Without slope, it is a rectangle along two axes, as a voxel's face is.
   struct Surfel {
     Vec3 normal{0.0F};             ///< normal for lighting
     float offset = 0.0F;           ///< of its centre from the edge's lower end, along the direction's axis
     std::array<float, 2> shift{};  ///< the same along kFaceFrames' u and v
-    std::array<float, 2> half{};   ///< from the middle to the sides along these, at most 1: multiples of 1/1,024
+    /// From the middle to the sides along these, at most 1, of shapes 1.5: multiples of 1/1,024 if there is a slope.
+    std::array<float, 2> half{};
     /// Rise of the plane along the direction's axis per sample along the other two axes.
     std::array<float, 2> slope{};
 
+    [[nodiscard]] bool is_inclined() const { return slope != std::array<float, 2>{}; }
     /// Returns its middle. `lower_end`: of its lattice edge.
     [[nodiscard]] DVec3 middle(DVec3 lower_end, Direction direction) const {
       const FaceFrame& frame = frame_of(direction);
@@ -123,7 +138,9 @@ struct ImpostorFaces {
   /// If level 0 holds surfels: cells of such faces and of the solid behind the surfels; see SurfaceCells::behind.
   Level unseen;
   BlockVector<Face> faces;
-  BlockVector<Surfel> surfels;  ///< of the last of `faces`
+  BlockVector<Surfel> surfels;         ///< of the last of `faces`
+  BlockVector<ShapeSide> shapes;       ///< of each of `surfels`; empty if no shape is shown
+  std::optional<VoxelRegistry> types;  ///< if there are shapes: keeps their models
   /// The rectangles of one part of a drawn impostor: `level` of `levels`, or `unseen` for kLevels.
   [[nodiscard]] const Level& level(std::size_t number) const {
     QUOIN_ASSERT(number <= kLevels, "a level, or the unseen faces");
@@ -133,11 +150,18 @@ struct ImpostorFaces {
     QUOIN_ASSERT(face < faces.size() && face >= faces.size() - surfels.size(), "a face with a surfel");
     return surfels[face - (faces.size() - surfels.size())];
   }
+  [[nodiscard]] bool has_surfel(std::size_t face) const { return face >= faces.size() - surfels.size(); }
+  /// Returns the side of a shape that a face shows; null for faces of voxels and fields.
+  [[nodiscard]] const ShapeSide* shape_of(std::size_t face) const {
+    QUOIN_ASSERT(face < faces.size() && (shapes.empty() || shapes.size() == surfels.size()), "a face of the impostor");
+    const std::size_t first = faces.size() - shapes.size();
+    return face < first || shapes[face - first].model == nullptr ? nullptr : &shapes[face - first];
+  }
 
   [[nodiscard]] std::size_t bytes() const;
 };
 
-/// Returns the openness, 0 to 1, at a point of a face (in the grid): from its corners for voxels in
+/// Returns the openness, 0 to 1, at a point of a face (in the grid): from its corners for voxels and shapes in
 /// OcclusionMode::Vertex and Smooth, otherwise from rays at its middle.
 [[nodiscard]] float openness_of(const ImpostorFaces::Face& face, OcclusionMode mode, DVec3 position);
 

@@ -229,7 +229,8 @@ TEST(ImpostorSeen, DrawingSeesSameFacesAsRays) {
     const auto shell = ImpostorShell::build(tree, 1 << 20, 1 << 20);
     ASSERT_TRUE(shell.has_value());
     const auto drawn = faces_seen_of(*shell, {}, tree.bounds(), content, 128);
-    const auto met = faces_seen_by_rays(tree, content, 128);
+    MetShapes no_shapes;
+    const auto met = faces_seen_by_rays({.grid = &grid, .types = &types, .opaque = &tree}, content, 128, no_shapes);
     ASSERT_GT(drawn.size(), 5'000U);
     const auto key_of = [](const ShellFace& face) {
       return std::tuple(face.voxel.x, face.voxel.y, face.voxel.z, static_cast<int>(face.direction));

@@ -252,6 +252,7 @@ Result<std::vector<FarInstance>> DeviceImpostors::send(const Scene& scene, const
   // Missing impostors come first: a constantly edited impostor would delay them forever.
   for (const bool is_first : {true, false}) {
     for (const auto& [grid, impostor] : far.kept) {
+      if (!impostor->faces().shapes.empty()) continue;
       const auto [found, is_new] = entries_.try_emplace(grid);
       Entry& entry = found->second;
       if (is_new) {
@@ -264,6 +265,7 @@ Result<std::vector<FarInstance>> DeviceImpostors::send(const Scene& scene, const
   }
   std::vector<FarInstance> sent;
   for (const FarInstance& instance : far.instances) {
+    if (!instance.impostor->faces().shapes.empty()) continue;
     const Sent& whole = entries_.find(scene.instances()[instance.instance].grid)->second.whole;
     if (whole.impostor != nullptr) sent.push_back({instance.instance, whole.impostor.get()});
   }
