@@ -463,6 +463,27 @@ TEST(LiveShapes, StatesChangeOnlyTheirRegion) {
   EXPECT_EQ(updates[0].surface->triangles(), 2 * static_cast<std::int64_t>(updates[0].surface->quads.size()) + 20);
 }
 
+// A door next to the last voxel of a chunk closes the bridge there, which then covers a cube of the next chunk.
+TEST(LiveShapes, FollowStatesTwoVoxelsAway) {
+  Scene scene;
+  const ShapeTypes types(scene.types);
+  const VoxelType over = scene.types.add({.name = "bridge", .shapes = bridge()}).value();
+  SceneGrid entry;
+  entry.grid.set({62, 5, 5}, types.door, {.state = 0});
+  entry.grid.set({63, 5, 5}, over);
+  entry.grid.set({64, 5, 5}, types.stone);
+  const GridHandle handle = scene.add_grid(std::move(entry));
+  scene.add_instance({"", handle});
+  LiveMeshes meshes;
+  ShownSurfaces shown;
+  for (const std::uint32_t state : {0U, 2U, 0U}) {
+    scene.edit(handle).grid.set_data({62, 5, 5}, {.state = state});
+    meshes.finish(scene, {});
+    shown.apply(meshes.take());
+    EXPECT_EQ(shown.find(handle, {1, 0, 0})->quads.size(), state == 0 ? 6U : 5U);
+  }
+}
+
 TEST(LiveShapes, AreCubesOnRequest) {
   ShapedWorld world(7);
   LiveMeshOptions options;
