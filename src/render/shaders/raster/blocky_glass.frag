@@ -24,7 +24,8 @@ vec3 normal_met(int instance, uint face, float t) {
 }
 LitPoint point_of_body(Body body) {
   Placed placed = placed_at(body.voxel.w);
-  if (kHasFieldGlass && (body.what.z & kBeginsInField) != 0) {
+  bool is_of_shape = kHasShapes && (body.what.z & kBeginsInShape) != 0;
+  if (is_of_shape || (kHasFieldGlass && (body.what.z & kBeginsInField) != 0)) {
     vec3 normal = normal_of_side(body, true);
     return point_of_body(body, placed, normal, max(dot(normal, mesh_frame().sun.xyz), 0.0));
   }
