@@ -44,8 +44,9 @@ struct ImpostorOptions {
 /// on earlier images. Impostors hold types, not colours: drawing uses the registry's current colours. Transparent
 /// voxels are left out; the renderer traces them.
 ///
-/// Sides of shapes are stored as rectangles of their own sizes and slopes. Sides with cutouts become several rectangles,
-/// in sixteenths of a voxel. They show the means of their textures. Sides of glass are left out like transparent voxels.
+/// Sides of shapes are stored as rectangles of their own sizes and slopes. Sides with cutouts become several
+/// rectangles, in sixteenths of a voxel. They show the means of their textures. Sides of glass are left out like
+/// transparent voxels.
 ///
 /// A field's surface is stored as pieces of its tangent planes (surfels), one per crossed edge of the sample lattice,
 /// with the normal of the traced surface.

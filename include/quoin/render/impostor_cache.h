@@ -24,10 +24,11 @@ struct ImpostorCacheOptions {
 ///   cache.wait(scene, 0.0);  // once per frame, at its end
 ///
 /// Workers read snapshots of the grids, so edits never wait for them. After an edit, only the affected parts are
-/// processed (Impostor::rebuilt), and `find` returns the old impostor until the new impostor is ready. Grids with shapes
-/// are processed whole, also if the state of a shape has changed. `find` never returns the impostor of a replaced grid
-/// or of another scene. When the cache is full, it drops the least recently used impostors. Impostors requested within
-/// one round, which ends with `wait`, never replace each other; requests that do not fit get no impostor.
+/// processed (Impostor::rebuilt), and `find` returns the old impostor until the new impostor is ready. Grids with
+/// shapes are processed whole, also if the state of a shape has changed. `find` never returns the impostor of a
+/// replaced grid or of another scene. When the cache is full, it drops the least recently used impostors. Impostors
+/// requested within one round, which ends with `wait`, never replace each other; requests that do not fit get no
+/// impostor.
 ///
 /// Lifetime: shares impostors with its callers; the scene is read only during calls.
 /// Threads:  any number can call at once, as long as no thread edits the scene at the same time.

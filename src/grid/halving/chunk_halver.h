@@ -23,8 +23,8 @@ constexpr std::uint64_t even_bits(std::uint64_t bits) {
   return (bits | bits >> 16) & 0x0000'0000'FFFF'FFFFU;
 }
 
-/// The cubes around one chunk of a halved grid, and the cells that are solid for that reason. Cubes are all voxels except
-/// air and those with shapes.
+/// The cubes around one chunk of a halved grid, and the cells that are solid for that reason. Cubes are all voxels
+/// except air and those with shapes.
 ///
 /// Space: fine, voxels from the chunk's least corner, -2 to 129 on each axis; cells, -1 to 64. Outside of the
 ///        chunk, only voxels and cells that share a face with the inside are known.

@@ -118,8 +118,8 @@ class ShapesAtVoxel {
 // type has shapes.
 [[nodiscard]] bool has_glass_parts(const VoxelProperties& type);
 
-// Returns the mean colour of the drawn sides of all shapes of a type by their areas, in linear light. Cutout sides count
-// by their visible texels. Requires: the type has shapes.
+// Returns the mean colour of the drawn sides of all shapes of a type by their areas, in linear light. Cutout sides
+// count by their visible texels. Requires: the type has shapes.
 [[nodiscard]] Vec3 mean_of_shapes(const VoxelProperties& type);
 
 // The shaped voxels of a grid, by the voxels that they touch: a shape may reach outside its own voxel. Chunks without

@@ -274,8 +274,8 @@ inline Layer& faces_towards(Direction direction, Scratch& s) {
 // the chunk's border hides.
 void hide_faces_at_border(const Job& job, Scratch& scratch);
 
-// Finds the squares that shaped neighbours cover of some sides of a shaped voxel: sets `masks`, by direction. Returns the
-// sides with such squares. Both sets of sides are bits.
+// Finds the squares that shaped neighbours cover of some sides of a shaped voxel: sets `masks`, by direction. Returns
+// the sides with such squares. Both sets of sides are bits.
 unsigned find_covered_squares(const Job& job, const ShapedVoxel& voxel, unsigned sides, const SideMask** masks);
 
 // Replaces `out` with the visible faces of the region's shapes. Requires: a kernel meshed the job.
@@ -312,8 +312,8 @@ void hide_faces_behind_shapes(const Job& job, Scratch& scratch);
 void find_covered_sides(const Job& job, bool row_ends, Scratch& scratch);
 
 // Lists the faces of cubes that the passes over directions leave out: if `job.has_faces` is false, those that shapes
-// cover; and those whose corners shapes may darken, which become `shapes->quads`, in the mesher's order. Requires: the z
-// view's opaque voxels are the occluders, and `shapes->sides` is filled. `row_ends`: its ends are valid.
+// cover; and those whose corners shapes may darken, which become `shapes->quads`, in the mesher's order. Requires: the
+// z view's opaque voxels are the occluders, and `shapes->sides` is filled. `row_ends`: its ends are valid.
 void take_faces_next_to_shapes(const Job& job, bool row_ends, Scratch& scratch);
 
 // Appends the quads of `shapes->quads` in a direction.

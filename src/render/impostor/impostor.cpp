@@ -196,8 +196,8 @@ class OpenRays {
     }
   }
 
-  // Shapes may cover the middles of the faces behind them: each ray starts at another place of such a face, and does not
-  // count if that is inside a shape.
+  // Shapes may cover the middles of the faces behind them: each ray starts at another place of such a face, and does
+  // not count if that is inside a shape.
   void spread(std::span<const std::uint32_t> faces, int ray) {
     constexpr double kStep = 2.0 / 3.0;
     for (std::uint32_t left = before_shapes_; left != 0; left &= left - 1) {

@@ -149,8 +149,8 @@ TEST(ImpostorShapes, MatchTracedShapesNear) {
   }
 }
 
-// Steps across all cell sizes. Measured: 0.14, 0.13 and 0.23 with faces, 9.2 and 7.3 with cells, in which thin shapes grow
-// to eighths of voxels (10.7 to 22.5 without shapes).
+// Steps across all cell sizes. Measured: 0.14, 0.13 and 0.23 with faces, 9.2 and 7.3 with cells, in which thin shapes
+// grow to eighths of voxels (10.7 to 22.5 without shapes).
 TEST(ImpostorShapes, LookLikeTracedShapesAtEveryDistance) {
   ShapeWorld world;
   Grid bare = world.yard(6);

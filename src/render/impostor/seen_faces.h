@@ -52,8 +52,8 @@ struct SeenFace {
 using MetShapes = std::map<IVec3, std::uint32_t, ByZyx>;
 
 /// Returns the faces that one ray per texel meets, and faces that share an edge with one of them (slivers between the
-/// rays). Works for any number of faces. `shapes`: receives the shapes that rays meet. Cost: about 0.15 microseconds per
-/// covered texel, 1 microsecond with shapes.
+/// rays). Works for any number of faces. `shapes`: receives the shapes that rays meet. Cost: about 0.15 microseconds
+/// per covered texel, 1 microsecond with shapes.
 [[nodiscard]] BlockVector<SeenFace> faces_seen_by_rays(const SolidVoxels& solid, const ContentSphere& content, int edge,
                                                        MetShapes& shapes);
 /// Appends all pieces of shapes that rays met, each seen by the views that it faces among those that met its shape.

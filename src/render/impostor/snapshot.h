@@ -71,8 +71,8 @@ struct SnapshotCamera {
 /// Returns the camera of a view. Up is the grid's +Y, or its +X if the view is within 8 degrees of the Y axis.
 [[nodiscard]] SnapshotCamera snapshot_camera(const ContentSphere& content, int view, int edge);
 
-/// One view of a grid's opaque voxels and shapes: the hit of each texel, rows from the top. A texel with type air hit no voxel;
-/// its depth is infinite.
+/// One view of a grid's opaque voxels and shapes: the hit of each texel, rows from the top. A texel with type air hit
+/// no voxel; its depth is infinite.
 struct Snapshot {
   SnapshotCamera camera;
   int edge = 0;                                  ///< texels per side

@@ -15,7 +15,8 @@
 
 namespace quoin {
 
-/// The surface of a grid, its shapes and its field in cells of 2^k voxels: 4^3 bits for each, and a box around the faces in it.
+/// The surface of a grid, its shapes and its field in cells of 2^k voxels: 4^3 bits for each, and a box around the
+/// faces in it.
 ///
 ///   +-+-+-+-+-+-+-+-+       # bits: set where a voxel with a face lies
 ///   | | | | | |#|#|#|

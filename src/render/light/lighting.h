@@ -56,8 +56,8 @@ struct SurfacePoint {
 /// Sets the side of a shape that a point shows: an index into `model.faces`, and the normal on the side that is seen.
 /// Corrects the rounding of the position. Requires: `point.face` is the direction nearest to the normal.
 void put_on_shape(const ShapeModel& model, std::int16_t face, const Vec3& normal, SurfacePoint& point);
-/// Turns the textures of a point by its voxel's state, on cubes and cells of halved grids. Requires: the state turns the
-/// point's type; `placed` is its grid.
+/// Turns the textures of a point by its voxel's state, on cubes and cells of halved grids. Requires: the state turns
+/// the point's type; `placed` is its grid.
 void turn_by_state(const PlacedGrid& placed, const VoxelRegistry& types, SurfacePoint& point);
 
 /// The reference lighting model: a sun with shadows, an ambient term with occlusion, and emission.

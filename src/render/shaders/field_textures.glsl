@@ -1,6 +1,7 @@
-// The textures of materials on fields; matches TriplanarRule and triplanar_colour (scene/surfaces.h) on the CPU. A
-// type's six textured faces hold its rule in `on_fields`: `steep_y`, `flat_y`, the textures per voxel, and the fraction
-// of this number in units of 2^-32 and 2^-64.
+// The textures of materials on fields; matches TriplanarRule and triplanar_colour (scene/surfaces.h) on the CPU.
+//
+// `on_fields` of a type's six textured faces: `steep_y`, `flat_y`, the textures per voxel, then the fraction of this
+// number in units of 2^-32 and 2^-64; the last is not used.
 
 // A point of a field's surface, in voxels of the full grid.
 struct FieldPoint {

@@ -605,8 +605,8 @@ std::uint32_t first_solids(const TracedShapes& shapes, const Grid& voxels, const
 
 namespace {
 
-// Returns the rays of a packet, active in `rays`, that hit opaque voxels or visible parts of shapes. All hit voxels that
-// are opaque or that shapes touch.
+// Returns the rays of a packet, active in `rays`, that hit opaque voxels or visible parts of shapes. All hit opaque
+// voxels, or voxels that shapes touch.
 std::uint32_t blocked_rays(const TracedShapes& shapes, const OccupancyTree& opaque, const VoxelRegistry& types,
                            const RayPacket& packet, std::uint32_t active, SolidRays& rays) {
   using Way = SolidRays::Way;

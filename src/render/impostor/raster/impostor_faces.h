@@ -96,8 +96,8 @@ struct ImpostorFaces {
   /// foot of a wall. `Face::voxel` is the edge's lower end, `direction` runs along the edge. So the surfels of one
   /// direction lie side by side like the lattice edges.
   ///
-  /// Also a piece of a shape's side: `Face::voxel` is the voxel of the shape, `direction` the one nearest to the normal.
-  /// Without slope, it is a rectangle along two axes, as a voxel's face is.
+  /// Also a piece of a shape's side: `Face::voxel` is the voxel of the shape, `direction` the one nearest to the
+  /// normal. Without slope, it is a rectangle along two axes, as a voxel's face is.
   struct Surfel {
     Vec3 normal{0.0F};             ///< normal for lighting
     float offset = 0.0F;           ///< of its centre from the edge's lower end, along the direction's axis

@@ -30,7 +30,8 @@ class DeviceImpostors {
   explicit DeviceImpostors(DeviceMemory& memory) : memory_(&memory) {}
 
   /// Begins an image: sends impostors, and returns the far instances whose impostor is complete; the others must be
-  /// traced, as must those with shapes. `waits`: sends all. Errors: LimitExceeded when a memory is full. It must then be cleared.
+  /// traced, as must those with shapes. `waits`: sends all. Errors: LimitExceeded when a memory is full. It must then
+  /// be cleared.
   [[nodiscard]] Result<std::vector<FarInstance>> send(const Scene& scene, const FarImpostors& far, bool waits);
 
   /// Prepares an image of `width` by `height` pixels to draw instances from their impostors: camera rays skip them,

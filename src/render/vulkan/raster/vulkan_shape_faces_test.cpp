@@ -1,5 +1,5 @@
-// Rasterised images show shapes of voxel types, cubes that their state turns, and cutout and translucent texels. Most of
-// the processor time is that of compiling pipelines, so tests that need further ones run nightly.
+// Rasterised images show shapes of voxel types, cubes that their state turns, and cutout and translucent texels.
+// Compiling pipelines takes most of the time, so tests that need further ones run nightly.
 
 #include <array>
 #include <memory>
