@@ -724,6 +724,12 @@ class Shapes(unittest.TestCase):
         self.assertEqual((scene.types[2].blocks_light, scene.types[2].name), (True, "dark"))
         self.assertEqual(len(scene.textures().shapes(2).parts), 1)
 
+    def test_tints_of_looks_may_be_lists(self):
+        scene = self.scene()
+        face = quoin.Face(np.full((16, 16, 3), 77, np.uint8), tint=[255, 128, 0])
+        scene.set_shapes(3, quoin.Element(max=(16, 8, 16), looks={"+Y": face, "-Y": face}))
+        self.assertEqual(scene.textures().shapes(3).parts[0].elements[0].looks["-Y"].tint, (255, 128, 0))
+
     def test_orientations_are_matrices(self):
         found = set()
         for axis in range(3):

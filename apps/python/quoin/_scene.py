@@ -641,8 +641,7 @@ class Scene:
     def placed_state(self, type: int, face: str, look: Sequence[float], point: Sequence[float] = (0.5, 1.0, 0.5),
                      state: int = 0, front: Optional[str] = None) -> int:
         """Returns the state of a voxel that a player places at a face: the orientation that fits best, with the other
-        bits of `state`. Torches point away from the face, slabs and stairs go into the half that was
-        hit.
+        bits of `state`. Torches point away from the face, slabs and stairs go into the half that was hit.
 
         `face`: direction of the face that was hit. `look`: direction of the player's view. `point`: the point that
         was hit, in voxels from the hit voxel's minimum corner. All are in the grid's space. `front`: the front turns

@@ -177,7 +177,6 @@ class Textures:
         _c.check(_c.lib.quoin_textures_faces(self._owner.handle, _c.size(type, "type"), found, ctypes.byref(count)))
         return tuple(_face_of(one, self._owner) for one in found) if count.value else None
 
-
     def shapes(self, type: int) -> Optional[Shapes]:
         """Returns the shapes of a type; None if it is a cube. Images of looks are read-only views, as in `faces`.
         Raises QuoinError if there is no such type.
@@ -294,7 +293,7 @@ class _Looks:
     def number_of(self, look: Any) -> int:
         if look is None:
             return -1
-        key: Any = (id(look.image), look[1:6]) if isinstance(look, Face) else tuple(look)
+        key: Any = (id(look.image), *look[1:4], tuple(look.tint), look.alpha) if isinstance(look, Face) else tuple(look)
         if key not in self._numbers:
             struct = _c.sized(_c.Face)
             if isinstance(look, Face):
