@@ -17,7 +17,10 @@ endif()
 # quoin_sources. The files of the build folder are written only if they change.
 function(quoin_kernel stem)
   # Wide vectors never cross a call.
-  set(common -Wno-psabi -fno-trapping-math $<$<CONFIG:Release>:-O3>)
+  set(common -Wno-psabi -fno-trapping-math)
+  if(QUOIN_CHECKED)  # the other sources then have -O1
+    list(APPEND common $<$<CONFIG:Release>:-O3>)
+  endif()
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     # GCC stops inlining when a source has grown by a share of its size. So code for packets made single rays slower.
     list(APPEND common --param=large-unit-insns=100000)
