@@ -143,6 +143,11 @@ TEST(ShapeHalving, TypesOfHalvedGridsAreCubes) {
   const Vec3 mean = mean_of_shapes(striped);
   EXPECT_FLOAT_EQ(mean.z, linear_colour({0, 0, 200}).z * 0.5F);
   EXPECT_FLOAT_EQ(mean.x, linear_colour({200, 0, 0}).x * 0.5F);
+  // Fluids do not show their parts.
+  striped.shapes = *VoxelShapes::from_rules(
+      {.parts = {{.shape = *VoxelShape::from_elements({box})}}, .neighbours = ShapeNeighbours::Fluid});
+  EXPECT_FLOAT_EQ(mean_of_shapes(striped).x, linear_colour(striped.colour).x);
+  EXPECT_EQ(mean_of_shapes(striped).z, 0.0F);
 }
 
 TEST(ShapeHalving, KeepsStatesThatTurn) {

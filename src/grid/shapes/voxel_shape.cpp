@@ -220,8 +220,10 @@ std::uint32_t placed_state(const VoxelProperties& type, const PlacingHit& hit, s
   if (orientations.empty()) return state;
   const DVec3 up(normal_of(up_of_placed(orientations, hit)));
   const PlacedFront wanted = hit.front.value_or(front_of_shape(type, state));
-  const double length = glm::length(hit.look);
-  DVec3 front = length > 0.0 && std::isfinite(length) ? hit.look / length : DVec3(0.0);
+  // Divided by its greatest component first, so that squares of long and short vectors stay in range.
+  const DVec3 look = hit.look / std::max({std::abs(hit.look.x), std::abs(hit.look.y), std::abs(hit.look.z)});
+  const double length = glm::length(look);
+  DVec3 front = std::isfinite(length) ? look / length : DVec3(0.0);  // else 0, infinite or no number
   if (wanted != PlacedFront::AwayFromPlayer) front = -front;
   const DVec3 wall(normal_of(hit.face));
   if (wanted == PlacedFront::AwayFromWall && glm::dot(wall, up) == 0.0) front = wall;
@@ -283,9 +285,12 @@ Vec3 mean_of_shapes(const VoxelProperties& type) {
     }
   };
   const ShapeRules& rules = type.shapes.rules();
-  if (rules.neighbours == ShapeNeighbours::Fluid) add_element({});
-  for (const ShapePart& part : rules.parts) {
-    for (const ShapeElement& element : part.shape.elements()) add_element(element);
+  if (rules.neighbours == ShapeNeighbours::Fluid) {
+    add_element({});  // fluids do not use their parts
+  } else {
+    for (const ShapePart& part : rules.parts) {
+      for (const ShapeElement& element : part.shape.elements()) add_element(element);
+    }
   }
   return weight > 0.0F ? sum / weight : linear_colour(type.colour);
 }

@@ -304,6 +304,13 @@ TEST(PlacedState, ToleratesViewsWithoutDirectionAndTypesWithoutOrientations) {
   }
 }
 
+TEST(PlacedState, TakesViewsOfAnyLength) {
+  const VoxelProperties furnace{.name = "furnace", .state_bits = 2, .orientations = StateOrientations::about_y()};
+  for (const double length : {1e-300, 1.0, 1e300}) {
+    EXPECT_EQ(placed_state(furnace, {.look = DVec3(length, 0.0, 0.0)}), 2U) << length;
+  }
+}
+
 TEST(ShapeAt, FencesConnectToFencesAndFullSides) {
   VoxelRegistry types;
   const VoxelType stone = *types.add({.name = "stone"});
