@@ -410,6 +410,22 @@ TEST_F(CShapes, StayWhenTypesAreReplaced) {
   EXPECT_EQ(type.state_bits, 4);
 }
 
+TEST_F(CShapes, StatesStayWhenTypesDeclareFewerBits) {
+  ASSERT_EQ(write({0, 0b1001, 0, 0}), QUOIN_OK);
+  ASSERT_EQ(quoin_type_set_shapes(scene_, 2, nullptr), QUOIN_OK);
+  ASSERT_EQ(quoin_type_set_orientations(scene_, 2, nullptr), QUOIN_OK);
+  auto type = sized<quoin_type>();
+  ASSERT_EQ(quoin_type_get(scene_, 2, &type), QUOIN_OK);
+  type.state_bits = 3;
+  ASSERT_EQ(quoin_type_set(scene_, 2, &type), QUOIN_OK) << quoin_last_error();
+  EXPECT_EQ(states()[1], 0b1001U);
+  const std::string path = test_file("fewer_bits.json");
+  EXPECT_NE(quoin_scene_save(scene_, path.c_str()), QUOIN_OK);
+  EXPECT_NE(std::string(quoin_last_error()).find("more than the 3 bits"), std::string::npos) << quoin_last_error();
+  ASSERT_EQ(write({0, 1, 0, 0}), QUOIN_OK);
+  EXPECT_EQ(quoin_scene_save(scene_, path.c_str()), QUOIN_OK) << quoin_last_error();
+}
+
 TEST_F(CShapes, TypesDeclareStateBits) {
   auto type = sized<quoin_type>();
   ASSERT_EQ(quoin_type_get(scene_, 2, &type), QUOIN_OK);
