@@ -179,6 +179,11 @@ struct TexturedFace {
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer TexturedFaces {
   TexturedFace at[];
 };
+const uint kAlphaShift = 12;
+// Returns the use of alpha from the third number of a textured face: 0 if all texels are opaque.
+uint alpha_of(uint bits) {
+  return bits >> kAlphaShift & 3;
+}
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Grids {
   GridTrees at[];
 };

@@ -62,12 +62,14 @@ void set_texel(vec3 texel, vec4 tint, inout Surface surface) {
   surface.emitted = surface.colour * tint.w;
 }
 
-// Shows the texture of a type's face, as `texel_of`; does nothing if it has none.
+// Shows the texture of a type's face, as `texel_of`; does nothing if it has none. Cutout and translucent faces keep the
+// mean colour of their type: their texels may have colours that cannot be seen.
 void show_texture(uint type, uint face, vec3 inside, float square_spacing, inout Surface surface) {
   uint number = textures_of(type);
   if (number == 0) return;
   TexturedFaces faces = TexturedFaces(frame().textured_faces);
   uvec4 what = faces.at[6 * (number - 1) + face].what;
+  if (alpha_of(what.z) != 0) return;
   vec4 tint = faces.at[6 * (number - 1) + face].tint;
   set_texel(texel_of(what, inside, square_spacing), tint, surface);
 }

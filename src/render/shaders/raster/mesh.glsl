@@ -46,7 +46,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Me
   uvec2 frame;  // of the image, shared with marched images
   uvec2 draws;
   uvec2 order;  // draw and quad indices of the transparent quads, in drawing order
-  uvec2 emissions;  // of types that have shapes, as multiples of their colours: a number per type, as in `surfaces`
+  uvec2 emissions;  // of types, as multiples of their colours: a number per type, as in `surfaces`
   vec4 sun;  // direction to it in the world; its length is the brightness
   MeshInstance instances[];
 };
@@ -92,13 +92,9 @@ const uint kMixed = 3;  // quads and shapes in the order stored in memory
 const uint kIsShapeFace = 8;
 const uint kShapeVoxelShift = 8;
 
-// Bits 12-13 of a textured face's third number.
-const uint kAlphaShift = 12;
+// Of `alpha_of`.
 const uint kCutout = 1;
 const uint kTranslucent = 2;
-uint alpha_of(uint bits) {
-  return bits >> kAlphaShift & 3;
-}
 // Returns true if edges of triangles are drawn.
 bool draws_edges() {
   return drawn() == kEdgesOver || drawn() == kEdgesOnly;
