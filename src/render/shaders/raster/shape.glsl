@@ -12,6 +12,7 @@ struct ShapeRecord {
 // Bits of `what.z`.
 const uint kOwnLook = 1u << 14;  // it has a texture of its own; else that of its type's face, bits 19-21
 const uint kTypeLookShift = 19;
+const uint kNoLook = 7;  // instead of a type's face: the colour of the type
 const uint kNormalShift = 22;  // the direction nearest to the normal
 const uint kIsOpen = 1u << 25;  // the box lacks sides, so that the inner sides of others can be seen
 const uint kIsPlate = 1u << 26;  // another face is its other side
@@ -52,12 +53,13 @@ void put_shape(Seen seen, uvec2 records, uvec2 shapes, uint number, uint index, 
   vec2 uv = vec2(own.w, down[corner]);
   bool has_look = (found.z & kOwnLook) != 0;
   float emission = 0.0;
-  if (kHasTextures && !has_look) {
+  uint type_look = found.z >> kTypeLookShift & 7;
+  if (kHasTextures && !has_look && type_look != kNoLook) {
     uint of_type = textures_of(type);
     has_look = of_type != 0;
     if (has_look) {
       TexturedFaces faces = TexturedFaces(frame().textured_faces);
-      uint face = 6 * (of_type - 1) + (found.z >> kTypeLookShift & 7);
+      uint face = 6 * (of_type - 1) + type_look;
       uvec4 of_face = faces.at[face].what;
       found.xyw = of_face.xyw;
       emission = faces.at[face].tint.w;

@@ -90,6 +90,7 @@ struct ShaderShapeRecord {
 constexpr int kAlphaShift = 12;
 constexpr std::uint32_t kOwnLook = std::uint32_t{1} << 14;
 constexpr int kTypeLookShift = 19;
+constexpr std::uint32_t kNoLook = 7;
 constexpr int kNormalShift = 22;
 constexpr std::uint32_t kIsOpen = std::uint32_t{1} << 25;
 constexpr std::uint32_t kIsPlate = std::uint32_t{1} << 26;

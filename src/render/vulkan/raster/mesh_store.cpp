@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include <glm/geometric.hpp>
@@ -117,8 +118,24 @@ float square_density(const ModelFace& face) {
   return (right * right + down * down) / glm::dot(edge, edge);
 }
 
-// `texels`: address, of the face's own look; 0 if it shows its type's.
-ShaderShapeRecord shape_record(const ShapeModel& model, std::uint16_t number, std::uint64_t texels) {
+// Returns the texture of a face's own look: white without one, so that the tint is seen. Returns null if the face shows
+// its type's look, or is glass without a texture, which has the colour of its type.
+const Texture* own_texture(const ShapeFace& face, bool is_transparent) {
+  static const Texture white = [] {
+    constexpr int kSize = kMinTextureSize;
+    const AlphaImage image{kSize, kSize, std::vector<std::uint8_t>(std::size_t{4} * kSize * kSize, 255)};
+    return Texture::from_image("white", image).value();
+  }();
+  const std::uint16_t look = face.model_face().look;
+  if (look < 6) return nullptr;
+  const Texture& own = face.model->looks[look - std::size_t{6}].texture;
+  if (!own.is_null()) return &own;
+  return is_transparent ? nullptr : &white;
+}
+
+// `texture`: see `own_texture`. `texels`: their address.
+ShaderShapeRecord shape_record(const ShapeModel& model, std::uint16_t number, const Texture* texture,
+                               std::uint64_t texels) {
   const ModelFace& face = model.faces[number];
   ShaderShapeRecord record;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -131,9 +148,13 @@ ShaderShapeRecord shape_record(const ShapeModel& model, std::uint16_t number, st
     record.bits |= std::uint32_t{face.look} << kTypeLookShift;
     return record;
   }
+  if (texture == nullptr) {
+    record.bits |= kNoLook << kTypeLookShift;
+    return record;
+  }
   const VoxelFace& look = model.looks[face.look - std::size_t{6}];
   record.texels = texels;
-  record.bits |= kOwnLook | static_cast<std::uint32_t>(look.texture.level_count() - 1) |
+  record.bits |= kOwnLook | static_cast<std::uint32_t>(texture->level_count() - 1) |
                  static_cast<std::uint32_t>(look.alpha) << kAlphaShift;
   record.tint = packed_colour(look.tint);
   return record;
@@ -149,8 +170,9 @@ ShaderShapeFace shader_face(const ShapeFace& face, std::size_t record) {
 // Returns a face of transparent material as glass; nullopt if its own look hides the background.
 std::optional<GlassShape> glass_shape(const ShapeFace& face, std::size_t number) {
   const ModelFace& shown = face.model_face();
-  if (shown.look >= 6 && face.model->looks[shown.look - std::size_t{6}].alpha != FaceAlpha::Translucent) {
-    return std::nullopt;
+  if (shown.look >= 6) {
+    const VoxelFace& look = face.model->looks[shown.look - std::size_t{6}];
+    if (!look.texture.is_null() && look.alpha != FaceAlpha::Translucent) return std::nullopt;
   }
   const Vec3 centre = 0.5F * (face.corner(0) + face.corner(2));
   return GlassShape{centre, shown.normal, static_cast<std::uint32_t>(number), face.type,
@@ -266,25 +288,25 @@ std::uint64_t bytes_in(const std::vector<std::uint32_t>& words) {
 
 // Writes quads, the faces of models that occur, each once, and the faces of shapes. Addresses count from the first one.
 Status MeshStore::add_shapes(const ChunkSurface& surface, std::vector<std::uint32_t>& words, StoredMesh& mesh) {
-  std::map<std::pair<const ShapeModel*, std::uint16_t>, std::size_t> known;
+  std::map<std::tuple<const ShapeModel*, std::uint16_t, bool>, std::size_t> known;
   std::vector<ShaderShapeRecord> records;
   std::vector<ShaderShapeFace> faces;
   faces.reserve(surface.shapes.size());
   StoredShapes& shapes = mesh.shapes;
   for (const ShapeFace& face : surface.shapes) {
-    const auto [record, is_new] = known.try_emplace({face.model, face.face}, records.size());
+    const bool is_transparent = faces.size() >= surface.opaque_shapes;
+    const Texture* const texture = own_texture(face, is_transparent);
+    const auto [record, is_new] = known.try_emplace({face.model, face.face, texture != nullptr}, records.size());
     if (is_new) {
-      const ModelFace& shown = face.model_face();
       std::uint64_t texels = 0;
-      if (shown.look >= 6) {
-        const VoxelFace& look = face.model->looks[shown.look - std::size_t{6}];
-        const auto address = send_texels(*memory_, *known_, look.texture, shapes.texels);
+      if (texture != nullptr) {
+        const auto address = send_texels(*memory_, *known_, *texture, shapes.texels);
         if (!address) return address.error();
         texels = *address;
       }
-      records.push_back(shape_record(*face.model, face.face, texels));
+      records.push_back(shape_record(*face.model, face.face, texture, texels));
     }
-    if (faces.size() >= surface.opaque_shapes) {
+    if (is_transparent) {
       if (const auto glass = glass_shape(face, faces.size())) shapes.glass.push_back(*glass);
     }
     faces.push_back(shader_face(face, record->second));

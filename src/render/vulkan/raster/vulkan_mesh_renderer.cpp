@@ -117,7 +117,7 @@ struct VulkanMeshRenderer::Impl {
   std::vector<vulkan::MeshInstance> instances;  // in the order of their handles; voxels, then the field
   vulkan::Place surfaces;
   std::vector<Vec4> surface_table;    // the content of `surfaces`
-  vulkan::Place emissions;            // of types with shapes
+  vulkan::Place emissions;            // of types; faces of shapes read it, also those of former types
   std::vector<float> emission_table;  // its content
   bool has_unoccluding = false;       // some of its opaque types do not darken corners
   vulkan::DeviceTextures textures;    // of the same types
@@ -176,12 +176,12 @@ void VulkanMeshRenderer::Impl::place(const Scene& of_scene, InstanceFilter filte
 
 Status VulkanMeshRenderer::Impl::put_surfaces(const VoxelRegistry& types) {
   std::vector<Vec4> table = vulkan::surface_table(types);
-  std::vector<float> glow(types.has_shapes() ? types.size() + 1 : 0);
+  std::vector<float> glow(types.size() + 1);
   for (std::size_t i = 0; i + 1 < glow.size(); ++i) glow[i] = emission_of(types[static_cast<VoxelType>(i)]);
   if (table == surface_table && glow == emission_table) return {};
   surface_table.clear();
   Status done = vulkan::put_table(*memory, surfaces, std::as_bytes(std::span(table)));
-  if (done && !glow.empty()) done = vulkan::put_table(*memory, emissions, std::as_bytes(std::span(glow)));
+  if (done) done = vulkan::put_table(*memory, emissions, std::as_bytes(std::span(glow)));
   if (done) done = memory->flush();
   if (done) {
     surface_table = std::move(table);

@@ -77,7 +77,10 @@ struct Yard {
     look.mirrored = true;
     for (ElementFace& face : board.faces) face.face = look;
     VoxelProperties fence{.name = "textured fence", .emission = 0.25F};
-    fence.shapes = *VoxelShape::from_elements({post, board});
+    // A look without a texture has the colour of its tint.
+    ShapeElement cap{.min = {3, 13, 3}, .max = {13, 15, 13}};
+    for (ElementFace& face : cap.faces) face.face = VoxelFace{.tint = {40, 200, 120}};
+    fence.shapes = *VoxelShape::from_elements({post, board, cap});
     textured_fence = scene.types.add(fence).value();
     SceneGrid yard;
     yard.pivot = {0.5, 0.25, -0.5};
@@ -330,6 +333,18 @@ TEST_F(VulkanShapeFaces, StoresFacesCompactly) {
   EXPECT_EQ(meshes_->stats().bytes, 0U);
   ASSERT_TRUE(meshes_->put({&update, 1}));
   EXPECT_EQ(renderer_->impl().texels.size(), textures);
+}
+
+// Meshes of former types stay until they are replaced.
+TEST_F(VulkanShapeFaces, DrawsShapesOfTypesThatAreGone) {
+  const Yard yard;
+  Scene bare;
+  Grid grid;
+  grid.set({0, 0, 0}, add_type(bare, {150, 140, 130}));
+  place(bare, std::move(grid));
+  put(bare, vulkan_test::blocky_surfaces(yard.scene));
+  const Image image = drawn(towards({9, 8, 14}, {0, 1, 0}), mesh_options(plain_light(64, 48)));
+  EXPECT_EQ(image.width, 64);
 }
 
 TEST_F(VulkanShapeFaces, RefusesFacesOutOfRange) {
