@@ -92,7 +92,7 @@ const uint kMixed = 3;  // quads and shapes in the order stored in memory
 const uint kIsShapeFace = 8;
 const uint kShapeVoxelShift = 8;
 
-// Of `alpha_of`.
+// Values that `alpha_of` returns.
 const uint kCutout = 1;
 const uint kTranslucent = 2;
 // Returns true if edges of triangles are drawn.
