@@ -8,6 +8,9 @@ layout(constant_id = 4) const bool kHasFields = false;
 layout(constant_id = 6) const bool kHasFieldGlass = false;
 // True if any grid has shapes (VoxelShapes).
 layout(constant_id = 8) const bool kHasShapes = false;
+// True if transparent types have textures: voxels of these are textured glass, or hollow cells of faces. Otherwise they
+// are glass of their mean colour.
+layout(constant_id = 9) const bool kHasCells = false;
 // The trees of a grid: its voxels, then its field, then the voxels that shapes touch.
 const int kContents = kHasShapes ? 3 : kHasFields ? 2 : 1;
 const int kGlassContents = kHasShapes ? 3 : kHasFieldGlass ? 2 : 1;
@@ -93,7 +96,9 @@ struct Point {
 // entry t and exit t, voxels, and entry t from the start of the instance's ray. `what`: type, face, flags of its ends,
 // and the exit: 8 times the instance, plus the face. For a field the face is a normal, in the form of `packed_normal`.
 // For a shape that the ray enters, the face is one of shapes.glsl, and the voxel is the one that has the shape. With
-// kIsTextured in `what.x`, the last number of `lengths` has the bits of the texel where the ray enters.
+// kIsTextured in `what.x`, the last number of `lengths` has the bits of the texel where the ray enters. With kIsFace in
+// `what.x` it is a visible texel of a cell of faces: the voxel and the face are those of the lit side, and the face has
+// 8 times the cell's own face added.
 struct Body {
   ivec4 voxel;
   vec4 lengths;
@@ -108,8 +113,12 @@ const uint kBeginsInShape = 8;
 const uint kHowItBegins = 3;
 const uint kBeginning = 11;   // all flags of its beginning
 const uint kExitNormal = 4;  // bits
-// Flag of its type.
+// Flags of its type, and the bits of the type.
 const uint kIsTextured = 0x80000000u;
+const uint kIsFace = 0x40000000u;
+const uint kBodyType = 0xFFFF;
+// In `what.z` of a face, as its only flag: it hides everything behind it.
+const uint kIsClosed = 16;
 
 // A pixel's state: the transmittance of the glass so far, the position to continue from, and the sample's colour so
 // far.
@@ -128,6 +137,7 @@ const uint kIsFar = 4;
 const uint kIsField = 8;
 const uint kIsBlended = 16;  // of a field: blended from the materials around, see blend_of_field
 const uint kIsShape = 32;
+const uint kIsCell = 64;  // of a transparent textured type; bits 8 to 10: the face whose texture it shows
 
 uint kind_of(Point point) {
   return point.what.z & 3;
@@ -165,6 +175,9 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Ve
 const uint kTextureNumber = 0xFFFF;
 const uint kTextureTurn = 16;  // bits: the turn of its voxels without data (pack_chunk)
 const uint kTurnBits = 0x1FF;
+const uint kIsTexturedGlass = 1u << 25;  // CellContent on the CPU, for transparent types with textures
+const uint kIsCellOfFaces = 1u << 26;
+const uint kHidesFaces = 1u << 30;  // of all opaque types: faces of neighbouring cells are not visible
 const uint kIsTurnedByState = 0x80000000u;
 
 // A face of a type: the address of its texels, of all mipmap levels, level 0 first. Then in bits 0-3 log2 of the texels
@@ -184,6 +197,9 @@ const uint kAlphaShift = 12;
 uint alpha_of(uint bits) {
   return bits >> kAlphaShift & 3;
 }
+// Values of a face's use of alpha; 0: opaque.
+const uint kCutout = 1;
+const uint kTranslucent = 2;
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Grids {
   GridTrees at[];
 };
@@ -301,5 +317,22 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   uvec2 shape_models;  // vectors: shapes.glsl
   uint shaped_grids;   // their number
 };
+
+// Returns the column or row of the nearest texel: grid/texture.h. `axis`: bits 4-6 or 8-10 of a textured face.
+uint texel_number(vec3 inside, uint axis, uint size) {
+  float along = inside[axis & 3];
+  if ((axis & 4) != 0) along = 1.0 - along;
+  return min(uint(max(0.0, along * float(size))), size - 1);
+}
+// Returns the nearest texel of a textured face, 8 bits each of red, green, blue, alpha. `inside`: the position in the
+// voxel; `log_size`: of the mipmap level.
+uint texel_at(uvec4 record, vec3 inside, uint log_size) {
+  uint last = record.z & 15;
+  uint column = texel_number(inside, record.z >> 4 & 7, 1u << log_size);
+  uint row = texel_number(inside, record.z >> 8 & 7, 1u << log_size);
+  // The levels before have size^2 * (1 + 1/4 + ...) texels.
+  uint begin = ((4u << 2 * last) - (4u << 2 * log_size)) / 3;
+  return Numbers(record.xy).at[begin + (row << log_size) + column];
+}
 
 #include "core.glsl"

@@ -123,11 +123,12 @@ vec3 sunlight_passed(uint slot, int home, Placed own, GridRay ray, float max_t) 
   BodyList list = BodyList(uvec2(0), 0, 0, 0, kInfinity);
 #endif
   vec3 passed = vec3(1.0);
+  met_closed_face = false;
   find_bodies(home, ray, view_from_grid(own, ray), own.ref_inside.w, max_t, 0.0, list, passed);
   uint i = 0;
   Body body;
   while (next_body(list, i, body)) {
-    passed *= passed_by(surface_of_body(body), body.lengths.z, has_own_length(body));
+    passed *= passed_by_body(body);
   }
   return passed;
 }

@@ -10,15 +10,34 @@ const float kThinnest = 1e-9;         // length in voxels of a plate, which has 
 const float kTouching = 4e-6;
 
 uint type_of(Body body) {
-  return kHasShapes ? body.what.x & ~kIsTextured : body.what.x;
+  return kHasShapes || kHasCells ? body.what.x & kBodyType : body.what.x;
+}
+bool is_face(Body body) {
+  return kHasCells && (body.what.x & kIsFace) != 0;
+}
+
+// Returns a type's entry in the table of texture numbers.
+uint texture_entry(uint type) {
+  return Numbers(frame().texture_numbers).at[min(type, frame().last_surface)];
+}
+// Returns the index of a textured type's face.
+uint face_of_cell(uint type, uint side) {
+  return 6 * ((texture_entry(type) & kTextureNumber) - 1) + side;
+}
+
+// Returns the tint and emission of a body's texel.
+vec4 tint_of_body(Body body) {
+  if (kHasShapes && (body.what.z & kBeginsInShape) != 0) return shape_vector(side_index(body.what.y) + 4);
+  uint side = is_face(body) ? body.what.y >> 3 : body.what.y;
+  return TexturedFaces(frame().textured_faces).at[face_of_cell(type_of(body), side)].tint;
 }
 
 // Returns the surface of a body: that of its type, with the colour and alpha of its texel if it is textured.
 Surface surface_of_body(Body body) {
   Surface surface = surface_of(type_of(body));
-  if (!kHasShapes || (body.what.x & kIsTextured) == 0) return surface;
+  if (!(kHasShapes || kHasCells) || (body.what.x & kIsTextured) == 0) return surface;
   vec4 texel = unpackUnorm4x8(floatBitsToUint(body.lengths.w));
-  vec4 tint = shape_vector(side_index(body.what.y) + 4);
+  vec4 tint = tint_of_body(body);
   surface.colour = linear_from_srgb(texel.xyz) * tint.xyz;
   surface.emitted = surface.colour * tint.w;
   float open = 1.0 - texel.w;
@@ -37,8 +56,19 @@ bool has_own_length(Body body) {
 #endif
   return (body.what.z & kHowItBegins) != 0;
 }
+// Returns the share of the light behind it that a face hides.
+float cover_of_face(Body body) {
+  return (body.what.z & kIsClosed) != 0 ? 1.0 : unpackUnorm4x8(floatBitsToUint(body.lengths.w)).w;
+}
+// Returns the transmittance of a body or face.
+vec3 passed_by_body(Body body) {
+  Surface surface = surface_of_body(body);
+  if (!is_face(body)) return passed_by(surface, body.lengths.z, has_own_length(body));
+  float cover = cover_of_face(body);
+  return (1.0 - cover) * (1.0 - cover * (1.0 - surface.colour));
+}
 bool continues(Body body, Body next) {
-  return type_of(next) == type_of(body) && reaches(body, next.lengths.x);
+  return !is_face(body) && !is_face(next) && type_of(next) == type_of(body) && reaches(body, next.lengths.x);
 }
 
 struct BodyList {
@@ -83,8 +113,9 @@ bool insert_body(inout BodyList list, Body body, out Body dropped) {
   uint i = list.count - 1;
   for (; i > 0; --i) {
     Body before = listed_body(list, i - 1);
-    bool stays = before.lengths.x < body.lengths.x ||
-                 (before.lengths.x == body.lengths.x && before.voxel.w <= body.voxel.w);
+    bool is_first = before.voxel.w <= body.voxel.w;
+    if (kHasCells) is_first = is_face(before) || (!is_face(body) && is_first);
+    bool stays = before.lengths.x < body.lengths.x || (before.lengths.x == body.lengths.x && is_first);
     if (stays) break;
     list_body(list, i, before);
   }
@@ -98,7 +129,7 @@ void keep_body(inout BodyList list, Body body, float from_t, inout vec3 passed) 
   Body dropped;
   if (!insert_body(list, body, dropped)) return;
   list.dropped_t = min(list.dropped_t, dropped.lengths.x);
-  passed *= passed_by(surface_of_body(dropped), dropped.lengths.z, has_own_length(dropped));
+  passed *= passed_by_body(dropped);
 }
 
 // The bodies of one instance along a ray, in order.
@@ -433,6 +464,54 @@ void add_shapes(ShapeRay cell, Body next, float exit_t, float ray_t, float voxel
   }
 }
 
+// Set by `add_faces`, cleared by callers: true if a ray met a face that hides everything behind it.
+bool met_closed_face;
+
+// Returns true if a voxel hides the faces of a neighbour of that type.
+bool hides_faces(GridTrees trees, ivec3 voxel, uint type) {
+  uvec4 chunk;
+  bool is_known = find_chunk(trees.opaque, voxel, chunk);
+  if (!is_known) is_known = find_chunk(trees.transparent, voxel, chunk);
+  uint other = is_known ? type_in(record_of(chunk), voxel & 63) : 0;
+  return other == type || (texture_entry(other) & kHidesFaces) != 0;
+}
+
+// Adds the faces of a cell that the ray meets: the outer side of the entry face and the inner side of the exit face.
+// Matches `meet_cell` in scene/surfaces.h on the CPU. `cell`: the voxel, with its type, faces and flags; the walk has
+// left it. `entry`: the position in the voxel where the ray enters. Returns false if a face ends the ray.
+bool add_faces(Body cell, vec3 entry, float enter_t, float ray_t, float room, float from_t, inout BodyList list,
+               inout vec3 passed) {
+  GridTrees trees = Grids(frame().grids).at[placed_at(cell.voxel.w).ref_base.w];
+  bool is_open = true;
+  for (int i = 0; i < 2 && is_open; ++i) {
+    bool is_outer = i == 0;
+    uint side = is_outer ? cell.what.y : cell.what.w & 7;
+    float t = is_outer ? enter_t : walk_t;
+    ivec3 front = cell.voxel.xyz;
+    front[axis_of(side)] += int(sign_of(side));
+    bool is_there = t <= room && !(is_outer && (cell.what.z & kStartsInside) != 0);
+    if (is_there) is_there = !hides_faces(trees, front, cell.what.x);
+    if (!is_there) continue;
+    uvec4 what = TexturedFaces(frame().textured_faces).at[face_of_cell(cell.what.x, side)].what;
+    uint alpha = what.z >> 12 & 3;
+    uint texel = texel_at(what, entry + (t - enter_t) * ray_direction, what.z & 15);
+    bool is_closed = alpha != kTranslucent && (alpha != kCutout || texel >> 24 >= kCutoutAlpha);
+    bool is_seen = is_closed || (alpha == kTranslucent && is_outer && texel >> 24 > 0);
+    is_closed = is_closed || (is_seen && texel >> 24 == 255);
+    if (!is_seen) continue;
+    Body face = cell;
+    if (!is_outer) face.voxel.xyz = front;
+    face.what.x |= kIsTextured | kIsFace;
+    face.what.y = (is_outer ? side : side ^ 1) | side << 3;
+    face.what.z = is_closed ? kIsClosed : 0;
+    face.lengths = vec4(ray_t + t, ray_t + t, 0.0, uintBitsToFloat(texel));
+    keep_body(list, face, from_t, passed);
+    is_open = !is_closed;
+  }
+  met_closed_face = met_closed_face || !is_open;
+  return is_open;
+}
+
 // Finds the bodies of an instance's voxels, of its field or of its shapes, along a ray whose walk has started.
 // `voxels_a_t`: full-grid voxels per t.
 void find_bodies_in(int i, bool is_of_field, bool is_of_shapes, GridRay ray, float voxels_a_t, float max_t,
@@ -442,6 +521,8 @@ void find_bodies_in(int i, bool is_of_field, bool is_of_shapes, GridRay ray, flo
   run.clarity = 0.0;
   run.has_body = false;
   bool goes_on = true;
+  // Cells of halved grids are glass of the mean colour.
+  bool has_cells = kHasCells && placed_at(i).ref_view.w == 1.0;
   while (goes_on && run.clarity > kClosed && find_voxel(room)) {
     Body next;
     next.voxel = ivec4(walk_voxel, i);
@@ -469,12 +550,33 @@ void find_bodies_in(int i, bool is_of_field, bool is_of_shapes, GridRay ray, flo
     } else {
       next.what = uvec4(type_found(), face_found(), inside, 8 * uint(i));
     }
+    vec3 entry = ray_origin + walk_t * ray_direction - vec3(walk_voxel - ray_base);
     goes_on = leave_block(shift, room);
     if (is_of_shapes) {
       add_shapes(shapes, next, min(walk_t, room), ray.t, voxels_a_t, from_t, run, list, passed);
       continue;
     }
     if (!is_of_field) next.what.w += uint(2 * walk_axis + (ray_forward[walk_axis] ? 0 : 1));
+    uint how = has_cells && !is_of_field ? texture_entry(next.what.x) : 0;
+    if ((how & kIsCellOfFaces) != 0) {
+      if (!add_faces(next, entry, enter_t, ray.t, room, from_t, list, passed)) break;
+      continue;
+    }
+    if ((how & kIsTexturedGlass) != 0) {
+      float exit_t = min(walk_t, room);
+      next.lengths = vec4(ray.t + enter_t, ray.t + exit_t, (exit_t - enter_t) * voxels_a_t, enter_t);
+      if (run.has_body && continues(run.body, next)) {
+        next.what.x = run.body.what.x;
+        next.what.y = run.body.what.y;
+        next.lengths.w = run.body.lengths.w;
+      } else if (inside == 0) {
+        uvec4 what = TexturedFaces(frame().textured_faces).at[face_of_cell(next.what.x, next.what.y)].what;
+        next.what.x |= kIsTextured;
+        next.lengths.w = uintBitsToFloat(texel_at(what, entry, what.z & 15));
+      }
+      add_to_run(run, next, from_t, list, passed);
+      continue;
+    }
     add_bodies(cell, is_mixed, next, enter_t, min(walk_t, room), ray.t, voxels_a_t, from_t, run, list, passed);
   }
   if (run.has_body) keep_body(list, run.body, from_t, passed);
@@ -495,6 +597,19 @@ void find_bodies(int i, GridTrees trees, GridRay ray, float voxels_a_t, float ma
   }
 }
 
+// Ends a body at the first face that hides everything behind it, if it reaches that far. `i`: the number of the next
+// body in the list.
+void end_at_face(BodyList list, uint i, inout Body body) {
+  for (; i < list.count; ++i) {
+    Body face = listed_body(list, i);
+    if (face.lengths.x >= body.lengths.y) return;
+    if (!is_face(face) || (face.what.z & kIsClosed) == 0) continue;
+    body.lengths.z *= (face.lengths.x - body.lengths.x) / (body.lengths.y - body.lengths.x);
+    body.lengths.y = face.lengths.x;
+    return;
+  }
+}
+
 // Gets the next body of a list, joined with the bodies that touch it. Returns false at the list's end.
 bool next_body(BodyList list, inout uint i, out Body body) {
   if (i >= list.count) return false;
@@ -509,6 +624,7 @@ bool next_body(BodyList list, inout uint i, out Body body) {
     body.lengths.z += next.lengths.z;
     ++i;
   }
+  if (kHasCells && !is_face(body)) end_at_face(list, i, body);
   return true;
 }
 

@@ -193,12 +193,14 @@ void trace_light(Point point, Placed placed, uint slot, out vec3 light, out floa
     }
     ++rays_taken;
     bool is_open = !is_blocked(point.voxel.w, placed, ray, max_t);
-    if (i >= 0 && i < rays.open_count) {
-      if (is_open) ++open;
+    bool is_of_occlusion = i >= 0 && i < rays.open_count;
+    vec3 passed = vec3(is_open ? 1.0 : 0.0);
+    bool needs_passed = kHasGlass && is_open && (kHasCells || !is_of_occlusion);
+    if (needs_passed) passed = sunlight_passed(slot, point.voxel.w, placed, ray, max_t);
+    if (is_of_occlusion) {
+      if (is_open && !(kHasCells && met_closed_face)) ++open;
       continue;
     }
-    vec3 passed = vec3(is_open ? 1.0 : 0.0);
-    if (kHasGlass && is_open) passed = sunlight_passed(slot, point.voxel.w, placed, ray, max_t);
     if (i < 0) {
       sunlight *= passed;
     } else {
@@ -258,7 +260,7 @@ uint turn_by_data(Tree opaque, ivec3 voxel, uint turn) {
 
 // Turns a face of a voxel, and a position in it, to the unturned cube, if the voxel's state turns its type.
 void turn_by_state(Point point, Placed placed, inout uint face, inout vec3 inside) {
-  uint how = Numbers(frame().texture_numbers).at[min(point.what.x, frame().last_surface)];
+  uint how = texture_entry(point.what.x);
   if ((how & kIsTurnedByState) == 0) return;
   uint turn = turn_by_data(opaque_tree(placed, 0), point.voxel.xyz, how >> kTextureTurn & kTurnBits);
   vec3 off = inside - 0.5;
@@ -272,8 +274,10 @@ void turn_by_state(Point point, Placed placed, inout uint face, inout vec3 insid
   face = shown;
 }
 
-// Shows the texture of a voxel's face. Seen from inside, it lies around the ray's start.
+// Shows the texture of a voxel's face. Seen from inside, it lies around the ray's start. Glass around the ray's start
+// shows no face.
 void show_texture(Point point, Placed placed, inout Surface surface) {
+  if (kind_of(point) == kGlow) return;
   uint face = point.what.y;
   vec3 inside = point.inside.xyz;
   float away = point.inside.w / placed.ref_inside.w;
@@ -286,7 +290,12 @@ void show_texture(Point point, Placed placed, inout Surface surface) {
   spacing *= has(kPerspective) ? away : 1.0 / placed.ref_inside.w;
   // Cells of halved grids and impostors stand for many voxels.
   bool is_mean = (point.what.z & kIsFar) != 0 || placed.ref_view.w != 1.0;
-  if (!is_mean) turn_by_state(point, placed, face, inside);
+  bool is_cell = kHasCells && (point.what.z & kIsCell) != 0;
+  if (is_cell) {
+    face = point.what.z >> 8 & 7;
+  } else if (!is_mean) {
+    turn_by_state(point, placed, face, inside);
+  }
   show_texture(point.what.x, face, inside, is_mean ? kMeanOfFace : spacing * spacing, surface);
 }
 
@@ -348,10 +357,14 @@ Point point_of(Body body) {
     point.what.z |= kIsShape;
     return point;
   }
+  if (kHasCells && (body.what.x & kIsTextured) != 0) {
+    point.what.y &= 7;
+    point.what.z |= kIsCell | (is_face(body) ? body.what.y >> 3 : body.what.y) << 8;
+  }
   ExactRay ray = exact_ray_in(placed_at(body.voxel.w), exact_direction());
   Pair start = start_from(ray, placed_at(body.voxel.w), body.voxel.xyz);
   Pair t = Pair(vec3(body.lengths.w), vec3(0.0));
-  if (!is_of_field) t = distance_to_face(ray, start, body.what.y);
+  if (!is_of_field) t = distance_to_face(ray, start, point.what.y);
   point.inside = vec4(sum_of(start, product_of(t, ray.direction)).high, body.lengths.x);
   return point;
 }
@@ -379,7 +392,7 @@ bool light_pixel(uint slot, inout State state) {
     vec3 weight = state.weight.xyz;
     if (is_body) {
       weight = pass_body(way, state);
-      point = point_of(way.body);
+      point = point_of(way.met);
     } else if (opaque.voxel.w < 0) {
       state.colour.xyz += weight * sky_colour(sky_up(at));
       return true;
@@ -387,6 +400,7 @@ bool light_pixel(uint slot, inout State state) {
     if (!is_of_field(point) && !is_of_shape(point)) point.inside.xyz = on_face(point.inside.xyz, point.what.y);
     state.colour.xyz += weight * light_of(point, slot);
     if (!is_body) return true;
+    if (is_face(way.met) && state.weight.xyz == vec3(0.0)) return true;  // it hides everything behind it
   }
 }
 

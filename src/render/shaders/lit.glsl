@@ -22,13 +22,6 @@ layout(constant_id = 7) const bool kHasTextures = false;
 
 const float kMeanOfFace = 1e30;
 
-// Returns the column or row of the nearest texel: grid/texture.h. `axis`: bits 4-6 or 8-10 of a textured face.
-uint texel_number(vec3 inside, uint axis, uint size) {
-  float along = inside[axis & 3];
-  if ((axis & 4) != 0) along = 1.0 - along;
-  return min(uint(max(0.0, along * float(size))), size - 1);
-}
-
 // Returns the number of a type's textured faces, from 1; 0 if it has none.
 uint textures_of(uint type) {
   return Numbers(frame().texture_numbers).at[min(type, frame().last_surface)] & kTextureNumber;
@@ -48,11 +41,7 @@ int mipmap_level(float square_spacing, int last) {
 vec3 texel_of(uvec4 record, vec3 inside, float square_spacing) {
   int last = int(record.z & 15);
   uint log_size = uint(last - mipmap_level(square_spacing, last));
-  uint column = texel_number(inside, record.z >> 4 & 7, 1u << log_size);
-  uint row = texel_number(inside, record.z >> 8 & 7, 1u << log_size);
-  // The levels before have size^2 * (1 + 1/4 + ...) texels.
-  uint begin = ((4u << 2 * last) - (4u << 2 * log_size)) / 3;
-  uint texel = Numbers(record.xy).at[begin + (row << log_size) + column];
+  uint texel = texel_at(record, inside, log_size);
   return linear_from_srgb(unpackUnorm4x8(texel).xyz);
 }
 
@@ -69,7 +58,7 @@ void show_texture(uint type, uint face, vec3 inside, float square_spacing, inout
   if (number == 0) return;
   TexturedFaces faces = TexturedFaces(frame().textured_faces);
   uvec4 what = faces.at[6 * (number - 1) + face].what;
-  if (alpha_of(what.z) != 0) return;
+  if (!kHasCells && alpha_of(what.z) != 0) return;
   vec4 tint = faces.at[6 * (number - 1) + face].tint;
   set_texel(texel_of(what, inside, square_spacing), tint, surface);
 }

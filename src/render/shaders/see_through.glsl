@@ -69,8 +69,11 @@ bool lies_on_opaque(Body body, float opaque_t) {
 struct Passage {
   BodyList list;
   uint next;
+  Body met;       // the latest body or face
+  bool has_met;
   Body body;      // the latest body
   bool has_body;
+  bool is_left;     // the ray left it before the latest face
   bool is_entered;  // the first body was entered earlier
   bool is_last;     // all bodies fitted; otherwise stop before the last body, which may continue in the next round
 };
@@ -79,7 +82,7 @@ Passage passage_through(BodyList list, bool is_entered) {
   Passage way;
   way.list = list;
   way.next = 0;
-  way.has_body = false;
+  way.has_body = way.has_met = way.is_left = false;
   way.is_entered = is_entered;
   way.is_last = list.dropped_t == kInfinity;
   return way;
@@ -91,22 +94,32 @@ Passage passage_through(BodyList list, bool is_entered) {
 bool enter_next(inout Passage way, float opaque_t, inout State state) {
   Body body;
   bool has_next = next_body(way.list, way.next, body);
-  bool is_met = has_next ? way.has_body || !way.is_entered
-                         : way.is_last && way.has_body && !lies_on_opaque(way.body, opaque_t);
-  if (has(kGlassSurfaces) && is_met) meet_surfaces(way.body, way.has_body, body, has_next, state);
+  bool has_from = way.has_body && !way.is_left;
+  bool is_at_face = has_next && is_face(body);
+  bool is_met = has_next ? way.has_met || !way.is_entered
+                         : way.is_last && has_from && !lies_on_opaque(way.body, opaque_t);
+  if (is_at_face) {
+    is_met = has_from && body.lengths.x > way.body.lengths.y;
+    way.is_left = way.is_left || is_met;
+  }
+  if (has(kGlassSurfaces) && is_met) meet_surfaces(way.body, has_from, body, has_next && !is_at_face, state);
   if (!has_next) return false;
-  if (!way.is_last && way.has_body && way.next == way.list.count) {
+  if (!way.is_last && way.has_met && way.next == way.list.count) {
     state.weight.w = body.lengths.x;
     return false;
   }
+  way.met = body;
+  way.has_met = true;
+  if (is_at_face) return true;
   way.body = body;
   way.has_body = true;
+  way.is_left = false;
   return true;
 }
 
-// Passes through the body; returns the weight of its own light.
+// Passes through the latest body or face; returns the weight of its own light.
 vec3 pass_body(Passage way, inout State state) {
-  Body body = way.body;
+  Body body = way.met;
   Surface surface = surface_of_body(body);
   // When values are shown, glass counts as opaque, except the body around the camera.
   if (has(kShowOcclusion) || has(kShowNormals)) {
@@ -114,6 +127,11 @@ vec3 pass_body(Passage way, inout State state) {
     vec3 weight = state.weight.xyz;
     state.weight.xyz = vec3(0.0);
     return weight;
+  }
+  if (is_face(body)) {
+    vec3 of_face = state.weight.xyz * cover_of_face(body);
+    state.weight.xyz *= passed_by_body(body);
+    return of_face;
   }
   vec3 weight = state.weight.xyz * own_share(surface, body.lengths.z, has_own_length(body));
   state.weight.xyz *= passed_by(surface, body.lengths.z, has_own_length(body));

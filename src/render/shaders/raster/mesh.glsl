@@ -93,8 +93,6 @@ const uint kIsShapeFace = 8;
 const uint kShapeVoxelShift = 8;
 
 // Values that `alpha_of` returns.
-const uint kCutout = 1;
-const uint kTranslucent = 2;
 // Returns true if edges of triangles are drawn.
 bool draws_edges() {
   return drawn() == kEdgesOver || drawn() == kEdgesOnly;

@@ -95,7 +95,7 @@ vec4 seen_from(int home, ivec3 base, vec3 from) {
     Passage way = passage_through(list, !is_first);
     while (enter_next(way, opaque_t, state)) {
       vec3 weight = pass_body(way, state);
-      if (kGlassStep != kGlassPassed) state.colour.xyz += weight * colour_of(point_of_body(way.body));
+      if (kGlassStep != kGlassPassed) state.colour.xyz += weight * colour_of(point_of_body(way.met));
     }
     is_last = way.is_last;
   }

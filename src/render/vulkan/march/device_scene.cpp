@@ -280,6 +280,7 @@ Result<std::uint64_t> send_texels(ShaderMemory& memory, KnownTexels& all, const 
 
 void DeviceTextures::clear() {
   texels_.clear();
+  has_cells_ = false;
   memory_->release(numbers_);
   memory_->release(faces_);
   std::erase_if(*known_, [](const auto& each) { return each.second.expired(); });
@@ -420,22 +421,30 @@ Status DeviceTextures::put(const VoxelRegistry& types) {
 }
 
 Status DeviceTextures::try_put(const VoxelRegistry& types) {
-  std::vector<std::uint32_t> numbers(types.size() + 1);
+  std::vector<std::uint32_t> numbers(types.size() + 1, kHidesFaces);
   std::vector<ShaderTexturedFace> faces;
   std::vector<std::shared_ptr<const DeviceTexels>> used;
+  bool has_cells = false;
   for (std::size_t i = 0; types.has_textures() && i < types.size(); ++i) {
     const VoxelProperties& type = types[static_cast<VoxelType>(i)];
+    const bool is_opaque = type.visibility == Visibility::Opaque;
+    numbers[i] = is_opaque ? kHidesFaces : 0;
     if (type.faces.empty()) continue;
     const std::array<std::uint32_t, 6> rule = words_of(TriplanarRule(type.field_textures));
+    bool is_glass = true;
     for (const Direction direction : kDirections) {
       const auto address = send_texels(*memory_, *known_, type.faces[direction].texture, used);
       if (!address) return address.error();
       const VoxelFace& face = type.faces[direction];
       faces.push_back(shader_face(face, face_texels(face, direction, emission_of(type)), *address));
       faces.back().on_fields = rule[static_cast<std::size_t>(direction)];
+      is_glass = is_glass && face.alpha == FaceAlpha::Translucent;
     }
-    numbers[i] = static_cast<std::uint32_t>(faces.size() / kDirections.size());
-    QUOIN_ASSERT(numbers[i] <= kTextureNumber, "a number per type");
+    const auto number = static_cast<std::uint32_t>(faces.size() / kDirections.size());
+    QUOIN_ASSERT(number <= kTextureNumber, "a number per type");
+    numbers[i] |= number;
+    if (!is_opaque) numbers[i] |= is_glass ? kIsTexturedGlass : kIsCellOfFaces;
+    has_cells = has_cells || (!is_opaque && !types.is_shaped(static_cast<VoxelType>(i)));
     if (type.orientations.empty()) continue;
     numbers[i] |= kIsTurnedByState | state_turn(type.orientations, 0) << kTextureTurn;
   }
@@ -444,6 +453,7 @@ Status DeviceTextures::try_put(const VoxelRegistry& types) {
     clear();
     return {};
   }
+  has_cells_ = has_cells;
   Status done = put_table(*memory_, numbers_, bytes_of(numbers));
   if (done) done = put_table(*memory_, faces_, bytes_of(faces));
   if (done) done = memory_->flush();

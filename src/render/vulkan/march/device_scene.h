@@ -103,6 +103,8 @@ class DeviceTextures {
 
   /// Returns true if no type has textures. Images then need no shaders for textures.
   [[nodiscard]] bool empty() const { return texels_.empty(); }
+  /// Returns true if transparent types without shapes have textures. Images of them need shaders for such voxels.
+  [[nodiscard]] bool has_cells() const { return has_cells_; }
   /// Sets the addresses of a frame. Requires: the frame's types are those of the last `put`.
   void put_in(ShaderFrame& frame) const;
 
@@ -116,6 +118,7 @@ class DeviceTextures {
   std::vector<std::shared_ptr<const DeviceTexels>> texels_;
   Place numbers_;
   Place faces_;
+  bool has_cells_ = false;
 };
 
 /// The models of shapes in device memory: boxes, free sides, and the looks of all sides with their texels. A model is

@@ -88,9 +88,9 @@ VkResult Pipelines::make(Pass pass, const PassFeatures& features) {
   if (pipeline != VK_NULL_HANDLE) return VK_SUCCESS;
   // Passes of one shader differ in its constants.
   const bool is_second = pass == Pass::LightWithGlass || pass == Pass::FarFaces;
-  const std::array constants = {ShaderConstant{0, is_second}, ShaderConstant{4, used.fields},
+  const std::array constants = {ShaderConstant{0, is_second},        ShaderConstant{4, used.fields},
                                 ShaderConstant{6, used.field_glass}, ShaderConstant{7, used.textures},
-                                ShaderConstant{8, used.shapes}};
+                                ShaderConstant{8, used.shapes},      ShaderConstant{9, used.cells}};
   return make_compute_pipeline(*device_, layout_, code_of(pass), constants, pipeline);
 }
 

@@ -30,11 +30,13 @@ struct PassFeatures {
   bool field_glass = false;  ///< fields have transparent parts
   bool textures = false;     ///< opaque types have textures
   bool shapes = false;       ///< voxels have shapes
+  bool cells = false;        ///< transparent types have textures
 
-  static constexpr std::size_t kCount = 16;
+  static constexpr std::size_t kCount = 32;
   /// Returns a number below kCount.
   [[nodiscard]] constexpr std::size_t index() const {
-    return (fields ? 1U : 0U) + (field_glass ? 2U : 0U) + (textures ? 4U : 0U) + (shapes ? 8U : 0U);
+    return (fields ? 1U : 0U) + (field_glass ? 2U : 0U) + (textures ? 4U : 0U) + (shapes ? 8U : 0U) +
+           (cells ? 16U : 0U);
   }
   /// Returns the features that a pass depends on.
   [[nodiscard]] constexpr PassFeatures of(Pass pass) const {
@@ -44,6 +46,7 @@ struct PassFeatures {
     used.field_glass = field_glass && in_glass;
     used.fields = used.field_glass || (fields && (is_light || pass == Pass::Primary));
     used.textures = textures && is_light;
+    used.cells = cells && in_glass;
     used.shapes = shapes && (is_light || in_glass || pass == Pass::Primary);
     return used;
   }

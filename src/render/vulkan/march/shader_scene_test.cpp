@@ -305,13 +305,30 @@ TEST(DeviceTextures, SendsTransparentTypes) {
   VoxelRegistry types;
   VoxelProperties glass = textured(grey(16, 20));
   glass.visibility = Visibility::Transparent;
-  ASSERT_TRUE(types.add(glass));
+  const VoxelType type = types.add(glass).value();
   QueuedMemory memory;
   vulkan::KnownTexels known;
   vulkan::DeviceTextures textures(memory, known);
   ASSERT_TRUE(textures.put(types));
   EXPECT_FALSE(textures.empty());
+  EXPECT_TRUE(textures.has_cells());
   EXPECT_EQ(known.size(), 1U);
+  VoxelProperties shaped = glass;
+  shaped.shapes = VoxelShape::crossed_plates();
+  types.replace(type, shaped);
+  ASSERT_TRUE(textures.put(types));
+  EXPECT_FALSE(textures.empty());
+  EXPECT_FALSE(textures.has_cells()) << "a shape";
+  types.replace(type, textured(grey(16, 20)));
+  ASSERT_TRUE(textures.put(types));
+  EXPECT_FALSE(textures.has_cells()) << "an opaque type";
+  types.replace(type, glass);
+  ASSERT_TRUE(textures.put(types));
+  EXPECT_TRUE(textures.has_cells());
+  types.replace(type, {});
+  ASSERT_TRUE(textures.put(types));
+  EXPECT_TRUE(textures.empty());
+  EXPECT_FALSE(textures.has_cells());
 }
 
 TEST(DeviceTextures, IsEmptyAfterFailedCall) {

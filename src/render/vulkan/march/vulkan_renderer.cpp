@@ -34,7 +34,8 @@ class ImagePass {
         scene_(&renderer.scene),
         textures_(&renderer.textures),
         placement_(&placement),
-        features_{placement.has_fields, placement.has_field_glass, !renderer.textures.empty(), placement.has_shapes},
+        features_{placement.has_fields, placement.has_field_glass, !renderer.textures.empty(), placement.has_shapes,
+                  placement.has_transparent && renderer.textures.has_cells()},
         light_(std::move(light)),
         content_(renderer.voxels),
         places_(renderer.memory, "drawing") {}

@@ -189,5 +189,49 @@ TEST_F(VulkanShapes, LightOfShapesMatchesCpu) {
   }
 }
 
+// Blocks of leaves, stained glass, and cells with faces of all kinds.
+TEST_F(VulkanShapes, CutoutAndTranslucentCubesMatchCpu) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
+  Scene scene;
+  const auto add = [&](VoxelFaces faces, Visibility visibility) {
+    VoxelProperties type{.visibility = visibility};
+    type.faces = std::move(faces);
+    return *scene.types.add(type);
+  };
+  const VoxelFace cutout{.texture = noise_with_alpha(1, 0), .turn = 1, .alpha = FaceAlpha::Cutout};
+  const VoxelFace translucent{
+      .texture = noise_with_alpha(2, 60), .tint = {255, 180, 90}, .alpha = FaceAlpha::Translucent};
+  const VoxelType stone = add(random_faces(5), Visibility::Opaque);
+  const VoxelType leaves = add(VoxelFaces(cutout), Visibility::Transparent);
+  const VoxelType stained = add(VoxelFaces(translucent), Visibility::Transparent);
+  const VoxelType mixed =
+      add(VoxelFaces(cutout, VoxelFace{render_test::random_texture(16, 3)}, translucent), Visibility::Transparent);
+  const VoxelType glass = render_test::add_type(scene, {120, 200, 230, 90}, Visibility::Transparent);
+  SceneGrid garden;
+  garden.grid.fill_box({{-8, -1, -8}, {9, 0, 9}}, stone);
+  garden.grid.fill_box({{-4, 0, -4}, {-1, 3, -1}}, leaves);
+  garden.grid.fill_box({{1, 0, -3}, {5, 2, -1}}, stained);
+  garden.grid.fill_box({{-3, 0, 2}, {0, 2, 4}}, mixed);
+  garden.grid.fill_box({{2, 0, 1}, {4, 2, 4}}, glass);
+  garden.grid.set({2, 1, 2}, leaves);
+  garden.grid.set({-1, 0, 0}, leaves);
+  garden.grid.set({0, 0, 2}, stained);
+  const GridHandle grid = scene.add_grid(std::move(garden));
+  scene.add_instance({"", grid});
+  Instance turned;
+  turned.grid = grid;
+  turned.position = {-3.0, 8.5, 2.0};
+  turned.rotation = glm::angleAxis(2.3, glm::normalize(DVec3(3, 1, 2)));
+  turned.voxel_size = 0.6;
+  scene.add_instance(turned);
+  const RenderOptions options = sized(240, 180);
+  compare(scene, towards({6, 5, 9}, {0, 0, 0}), options, "cells");
+  compare(scene, towards({-2.5, 0.8, 1.2}, {-1, 0.6, 3}), options, "cells_near");
+  compare(scene, towards({60, 40, 90}, {0, 1, 0}, 0.3), options, "cells_distant");
+  RenderOptions unlit = options;
+  unlit.light.shading = Shading::Unlit;
+  compare(scene, towards({-2.4, 1.3, -2.6}, {4, 1, 3}, 1.2), unlit, "cells_inside");
+}
+
 }  // namespace
 }  // namespace quoin

@@ -281,6 +281,9 @@ struct ShaderFrame {
 // Bits of a type's entry in the table of texture numbers; see data.glsl.
 constexpr std::uint32_t kTextureNumber = 0xFFFF;
 constexpr std::uint32_t kTextureTurn = 16;  ///< first bit of `state_turn` for state 0
+constexpr std::uint32_t kIsTexturedGlass = 1U << 25;
+constexpr std::uint32_t kIsCellOfFaces = 1U << 26;
+constexpr std::uint32_t kHidesFaces = 1U << 30;
 constexpr std::uint32_t kIsTurnedByState = 1U << 31;
 
 /// A face of a type with textures; see data.glsl.
