@@ -31,7 +31,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/chunk/chunk_storage.h", {"mesh", "render", "store", "trace"}},
     {"grid/colour_table.h", {"io", "voxelize"}},
     {"grid/density/density_storage.h", {"mesh", "store", "trace"}},
-    {"grid/shapes/shape_index.h", {"scene"}},
+    {"grid/shapes/shape_index.h", {"render", "scene"}},
     {"io/format_driver.h", {"store"}},
     {"io/scene_file/scene_parts.h", {"store"}},
     {"scene/surfaces.h", {"io", "render"}},
@@ -39,6 +39,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"scene/scene_follower.h", {"live"}},
     {"scene/tracer/placed_grid.h", {"render"}},
     {"scene/tracer/scene_view.h", {"render"}},
+    {"scene/tracer/shape_rays.h", {"render"}},
     {"scene/tracer/instance_tree.h", {"render"}},
     {"scene/tracer/tree_cache.h", {"render"}},
     {"mesh/surface/voxel_surface.h", {"render", "scene"}},
@@ -49,11 +50,11 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"trace/chunk_rows.h", {"render", "scene"}},
     {"trace/density/density_glass.h", {"render", "scene"}},
     {"trace/tree_view.h", {"render"}},
-    {"trace/walk.h", {"render"}},
+    {"trace/walk.h", {"render", "scene"}},
 };
 
 // Pairs of a lent header and its user. Lower it when a pair goes; a higher number needs a reason in docs/decisions.
-constexpr std::size_t kMaxLoans = 33;
+constexpr std::size_t kMaxLoans = 36;
 
 // A file with fewer lines needs a reason, because compile time and a reader's way are paid per file.
 constexpr int kSmallFile = 60;

@@ -494,8 +494,8 @@ QUOIN_API quoin_status quoin_type_count(quoin_scene scene, size_t* out);
 QUOIN_API quoin_status quoin_type_get(quoin_scene scene, size_t index, quoin_type* out);
 QUOIN_API quoin_status quoin_type_add(quoin_scene scene, const quoin_type* type, uint16_t* out);
 /* Replaces the properties of a type. Its faces, orientations and shapes stay. So do the states of its voxels:
- * quoin_scene_save refuses those with more than state_bits. Set the blocks_light of a type with shapes after its shapes:
- * by default, shapes let light through where they leave a side open. */
+ * quoin_scene_save refuses those with more than state_bits. Set the blocks_light of a type with shapes after its
+ * shapes: by default, shapes let light through where they leave a side open. */
 QUOIN_API quoin_status quoin_type_set(quoin_scene scene, size_t index, const quoin_type* type);
 
 /* Sets the textures of a type: six faces, in the order +X, -X, +Y, -Y, +Z, -Z. `size` is set in each element. Copies

@@ -18,9 +18,9 @@ namespace [[gnu::visibility("default")]] quoin {
 /// Solid:   a cell becomes solid if at least 4 of its 8 voxels are not air. Thin structures are kept by a second rule.
 ///          A thin cell has 2 or 3 voxels, with voxels in both halves along an axis. It becomes solid if a neighbour
 ///          along that axis is not empty, and none of the four cells next to it across the axis has 4 or more voxels.
-///          Of two thin cells side by side, at an even and the next odd coordinate, only the lower becomes solid: a
-///          rod that is two voxels wide there becomes a rod one cell wide. Each solid cell covers at least 2 voxels, so
-///          the volume of the result is at most 4 times the volume of the grid.
+///          If two thin cells lie side by side, at an even and the next odd coordinate, only the lower becomes solid:
+///          a rod that is two voxels wide there becomes a rod one cell wide. Each solid cell covers at least 2 voxels,
+///          so the volume of the result is at most 4 times the volume of the grid.
 /// Type:    opaque types win over transparent types. Among these, the type with the greatest weight wins; ties go to
 ///          the lower type. A voxel weighs 1, plus 8 per face that meets air (tuned on images of terrain).
 /// Shapes:  voxels whose type has shapes are air in these rules, and then count by their coverage: the mean share of a

@@ -84,8 +84,8 @@ class Impostor {
   /// there are very many faces; then it processes all.
   ///
   /// Requires: this impostor was built from the grid or a snapshot of it, without a field, with types of the same
-  ///           visibility and shapes; `changes` are all changes since, and no shape has another state. Only the absence
-  ///           of a field is checked. Grids with shapes are processed whole.
+  ///           visibility and shapes; `changes` are all changes since, and no shape has another state. Only fields are
+  ///           checked for. Grids with shapes are processed whole.
   /// Cost:     about 20 ns per face, plus the parts that the edit can affect.
   [[nodiscard]] Impostor rebuilt(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) const;
 

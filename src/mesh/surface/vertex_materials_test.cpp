@@ -156,7 +156,7 @@ TEST(VertexMaterials, SharedVerticesAreEqualInAllChunks) {
   }
 }
 
-// The twin of the test above notices chunks that mix the materials of their neighbours' vertices by their own level.
+// The comparison above notices chunks that mix the materials of their neighbours' vertices by their own level.
 TEST(VertexMaterials, SeamsWouldBeSeenWithLevelsOfTheirOwn) {
   const VoxelRegistry types = types_with_textures(9);
   const Shared shared = shared_of(random_field(2, 9, 5), types, 2, materials_by_own_level);

@@ -51,8 +51,8 @@ void set_texel(vec3 texel, vec4 tint, inout Surface surface) {
   surface.emitted = surface.colour * tint.w;
 }
 
-// Shows the texture of a type's face, as `texel_of`; does nothing if it has none. Cutout and translucent faces keep the
-// mean colour of their type: their texels may have colours that cannot be seen.
+// Shows the texture of a type's face, as `texel_of`; does nothing if it has none. Without kHasCells, cutout and
+// translucent faces keep the mean colour of their type: their texels may have colours that cannot be seen.
 void show_texture(uint type, uint face, vec3 inside, float square_spacing, inout Surface surface) {
   uint number = textures_of(type);
   if (number == 0) return;

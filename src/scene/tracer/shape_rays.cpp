@@ -452,7 +452,7 @@ class SolidRays {
   [[nodiscard]] RayHit cube(const Ray& in_grid) const {
     return {walk_.voxel(), trace::face_of(walk_, in_grid), walk_.t(), walk_.axis() < 0};
   }
-  // The rests of the rays that go on, which are active.
+  // The rests of the rays that go on; these rays are active.
   [[nodiscard]] RayPacket& rest() { return rest_; }
   // Returns the voxel in which the rest of a ray starts.
   [[nodiscard]] const Entry& entry_of(int lane) const { return entries_[static_cast<std::size_t>(lane)]; }

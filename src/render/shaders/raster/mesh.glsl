@@ -92,7 +92,6 @@ const uint kMixed = 3;  // quads and shapes in the order stored in memory
 const uint kIsShapeFace = 8;
 const uint kShapeVoxelShift = 8;
 
-// Values that `alpha_of` returns.
 // Returns true if edges of triangles are drawn.
 bool draws_edges() {
   return drawn() == kEdgesOver || drawn() == kEdgesOnly;

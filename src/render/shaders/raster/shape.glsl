@@ -9,7 +9,7 @@ struct ShapeRecord {
   uvec4 what;       // of a face with a texture of its own, as in TexturedFace, with axes x and y; and the bits below
 };
 
-// Bits of `what.z`.
+// Bits of the third number in `what`.
 const uint kOwnLook = 1u << 14;  // it has a texture of its own; else that of its type's face, bits 19-21
 const uint kTypeLookShift = 19;
 const uint kNoLook = 7;  // instead of a type's face: the colour of the type

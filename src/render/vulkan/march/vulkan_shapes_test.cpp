@@ -123,26 +123,6 @@ TEST_F(VulkanShapes, GlassOfShapesMatchesCpu) {
   compare(garden.scene, towards({-1.2, 0.7, 4.4}, {3, 0.4, 5}), options, "in_water");
 }
 
-// Only meshes show cutout and translucent texels of cubes.
-TEST_F(VulkanShapes, TexturedGlassCubesHaveTheirMeanColour) {
-  const auto image = [&](bool has_texture) {
-    Scene scene;
-    VoxelProperties glass{.name = "glass", .visibility = Visibility::Transparent};
-    glass.faces = VoxelFaces(VoxelFace{.texture = noise_with_alpha(4, 0), .alpha = FaceAlpha::Cutout});
-    const VoxelType type = *scene.types.add(glass);
-    if (!has_texture) {
-      glass.colour = scene.types[type].colour;
-      glass.faces = {};
-      scene.types.replace(type, glass);
-    }
-    Grid grid;
-    grid.fill_box({{0, 0, 0}, {2, 2, 2}}, type);
-    render_test::place(scene, std::move(grid));
-    return taken(scene, towards({4, 3, 6}, {1, 1, 1}), vulkan_test::of_day(sized(48, 36)));
-  };
-  expect_equal(image(true), image(false), "textured_glass_cubes");
-}
-
 // Edits of voxels, of states and next to shapes that follow their neighbours.
 TEST_F(VulkanShapes, EditedShapesMatchCpu) {
   Garden garden(is_nightly());

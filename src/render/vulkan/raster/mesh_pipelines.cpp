@@ -95,20 +95,23 @@ constexpr std::uint32_t kSmoothFragment[] = {
 constexpr std::uint32_t kBlockyGlassFragment[] = {
 #include "blocky_glass.frag.inc"
 };
+constexpr std::uint32_t kSmoothGlassVertex[] = {
+#include "smooth_glass.vert.inc"
+};
 constexpr std::uint32_t kSmoothGlassFragment[] = {
 #include "smooth_glass.frag.inc"
 };
 
-constexpr std::array<std::span<const std::uint32_t>, 10> kCode = {
-    kSkyVertex,      kSkyFragment, kBlockyVertex,        kBlockyFragment,      kSmoothVertex,
-    kSmoothFragment, kFarVertex,   kBlockyGlassFragment, kSmoothGlassFragment, kFarFragment};
+constexpr std::array<std::span<const std::uint32_t>, 11> kCode = {
+    kSkyVertex, kSkyFragment,         kBlockyVertex,        kBlockyFragment, kSmoothVertex,     kSmoothFragment,
+    kFarVertex, kBlockyGlassFragment, kSmoothGlassFragment, kFarFragment,    kSmoothGlassVertex};
 
 // Returns the vertex and fragment shaders, as indices of `kCode`. Shaders for vision through glass take seconds to
 // compile on a CPU driver, so they are separate from all others.
 std::array<std::size_t, 2> shaders_of(const MeshWay& way) {
   const bool sees_through = way.glass_by_rays && way.mode != kDrawGlassDepth;
   if (sees_through && way.what == MeshWay::What::Blocky) return {2, 7};
-  if (sees_through && way.what == MeshWay::What::Smooth) return {4, 8};
+  if (sees_through && way.what == MeshWay::What::Smooth) return {10, 8};
   switch (way.what) {
     case MeshWay::What::Sky:
       return {0, 1};
