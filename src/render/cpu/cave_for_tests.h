@@ -7,6 +7,7 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 
+#include "grid/shapes/shape_types_for_tests.h"
 #include "render/cpu/render_test_support.h"
 
 namespace quoin {
@@ -64,6 +65,36 @@ struct Cave {
     properties.emission = emission;
     return scene.types.add(properties).value();
   }
+};
+
+/// A dim hall with two open sides and a lamp. Full boxes, shapes or cubes, float in it. `has_others`: more shapes stand
+/// on the floor.
+struct Hall {
+  explicit Hall(bool has_others, bool has_shaped_boxes = true) {
+    VoxelProperties of_box{.name = "box", .colour = {220, 210, 190}};
+    if (has_shaped_boxes) of_box.shapes = VoxelShape::box({0, 0, 0}, {16, 16, 16});
+    const VoxelType box = scene.types.add(of_box).value();
+    const VoxelType lamp = scene.types.add({.name = "lamp", .colour = {255, 150, 60}, .emission = 1.0F}).value();
+    Grid grid;
+    grid.fill_box({{-9, -1, -9}, {10, 7, 10}}, types.stone);
+    grid.fill_box({{-8, 0, -8}, {10, 6, 10}}, kAir);
+    grid.set({-4, 3, -2}, lamp);
+    for (const IVec3 at : {IVec3{-1, 3, -4}, {4, 2, 3}, {-5, 2, 4}, {2, 3, -1}}) grid.set(at, box);
+    if (has_others) {
+      grid.fill_box({{-6, 0, -6}, {-2, 1, -2}}, types.slab);
+      for (std::uint32_t i = 0; i < 8; ++i) grid.set({static_cast<int>(i) - 4, 0, 0}, types.stairs, {.state = i});
+      for (std::uint32_t i = 0; i < 4; ++i) grid.set({static_cast<int>(i) - 1, 0, 3}, types.door, {.state = i});
+      for (int i = 0; i < 5; ++i) grid.set({i + 1, 0, -4}, types.fence);
+      grid.set({-3, 0, 6}, types.flower);
+      grid.set({5, 1, 6}, types.beam);
+      grid.set({0, 0, 6}, box);
+    }
+    render_test::place(scene, std::move(grid));
+  }
+  [[nodiscard]] static Camera inside() { return render_test::towards({8.5, 5.0, 9.5}, {-1.5, 1.0, -0.5}, 1.1); }
+
+  Scene scene;
+  ShapeTypes types{scene.types};
 };
 
 [[nodiscard]] inline RenderOptions propagated(int width, int height, OcclusionMode occlusion = OcclusionMode::Off) {

@@ -169,6 +169,39 @@ TEST(RenderPropagated, LightsFieldsOpenToSky) {
   EXPECT_GT(pixel_at(shade, 16, 16)[0], 0);
 }
 
+TEST(RenderPropagated, LightsFullBoxesLikeCubes) {
+  const RenderOptions options = propagated(120, 90);
+  const RenderedImage shapes = taken(Hall(false).scene, Hall::inside(), options);
+  const RenderedImage cubes = taken(Hall(false, false).scene, Hall::inside(), options);
+  EXPECT_EQ(count_different(shapes, cubes, 1), 0);
+  EXPECT_GT(count_different(shapes, taken(Hall(true).scene, Hall::inside(), options), 1), 1000);
+}
+
+// The light is symmetric about the middle of a voxel, and so are the shapes.
+TEST(RenderPropagated, LightsShapesSymmetrically) {
+  Scene scene;
+  const ShapeTypes types(scene.types);
+  const VoxelType lamp = add_type(scene, {255, 200, 120, 255}, Visibility::Opaque, 1.0F);
+  Grid grid;
+  grid.fill_box({{-16, -1, -16}, {17, 7, 17}}, types.stone);
+  grid.fill_box({{-15, 0, -15}, {16, 6, 16}}, kAir);
+  grid.fill_box({{-6, 0, -6}, {7, 1, 7}}, types.slab);
+  grid.set({0, 4, 0}, lamp);
+  place(scene, std::move(grid));
+  const RenderedImage image = taken(scene, from_above(0.5, 3.9, 0.5, 12.0), propagated(60, 60));
+  int uneven = 0;
+  for (int y = 0; y < 60; ++y) {
+    for (int x = 0; x < 60; ++x) {
+      const Pixel shown = pixel_at(image, x, y);
+      for (const Pixel& other : {pixel_at(image, 59 - x, y), pixel_at(image, x, 59 - y)}) {
+        for (std::size_t c = 0; c < 3; ++c) uneven += std::abs(shown[c] - other[c]) > 1;
+      }
+    }
+  }
+  EXPECT_EQ(uneven, 0);
+  EXPECT_GT(pixel_at(image, 30, 30)[0], pixel_at(image, 2, 30)[0] + 20);
+}
+
 TEST(RenderPropagated, RejectsInvalidLeastLight) {
   Cave cave;
   RenderOptions options = propagated(8, 8);

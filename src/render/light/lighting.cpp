@@ -43,6 +43,11 @@ bool is_on_side(const SurfacePoint& point) {
   return point.shape_face >= 0 && face_of_shape(point).on_side;
 }
 
+// Returns true if a point of a shape lies on the side of its voxel that it faces, as points of cubes do.
+bool faces_out_of_voxel(const SurfacePoint& point) {
+  return is_on_side(point) && !point.is_tilted && point.face == face_of_shape(point).direction;
+}
+
 // The groups of points that are lit together.
 constexpr std::size_t kGroups = 16;
 
@@ -264,8 +269,10 @@ void Lighting::find_propagated(const Group& group, std::span<Vec3> light) const 
     const auto i = static_cast<std::size_t>(std::countr_zero(left));
     const SurfacePoint& point = *group.points[i];
     MeanLevels levels;
-    if (point.has_normal() || point.model != nullptr) {
-      levels = light_before(voxels, point.position * std::ldexp(1.0, level), Vec3(normal_at(point)), 1 << level);
+    if (point.has_normal() || (point.model != nullptr && !faces_out_of_voxel(point))) {
+      DVec3 at = point.position * std::ldexp(1.0, level);
+      if (!point.in_field) at -= 0.5;  // light_before counts from the centre of voxel 0
+      levels = light_before(voxels, at, Vec3(normal_at(point)), 1 << level);
     } else {
       const FacePlace place(point.voxel, point.face, point.position - DVec3(point.voxel), level);
       levels = light_on_face(voxels, place, point.face, level);

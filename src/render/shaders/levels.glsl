@@ -159,6 +159,13 @@ struct LevelPlace {
   int face;     // of the voxel; -1: on a surface
 };
 
+// Returns the position of a shape's point. `inside`: from the lower corner of `voxel`. `face`: if the point lies on a
+// side of the voxel and faces outwards, that side, which is lit as a cube's; else -1.
+LevelPlace place_on_shape(ivec3 voxel, vec3 inside, vec3 normal, int face) {
+  if (face < 0) inside -= 0.5;  // a voxel's light is that of its centre
+  return LevelPlace(voxel, inside, normal, face);
+}
+
 // Returns all light at a surface point.
 vec3 light_by_levels(LevelPlace at, Placed placed) {
   ivec3 cell = at.voxel + placed.origin.xyz;

@@ -172,8 +172,11 @@ float openness_of(Point point, Placed placed, int open) {
 }
 
 LevelPlace level_place(Point point) {
-  return LevelPlace(point.voxel.xyz, point.inside.xyz, grid_normal(point),
-                    is_of_field(point) || is_of_shape(point) ? -1 : int(point.what.y));
+  vec3 normal = grid_normal(point);
+  if (is_of_shape(point)) {
+    return place_on_shape(point.voxel.xyz, point.inside.xyz, normal, side_of_voxel(point.what.y));
+  }
+  return LevelPlace(point.voxel.xyz, point.inside.xyz, normal, is_of_field(point) ? -1 : int(point.what.y));
 }
 
 // Computes the light of the sun and lamps at a surface point, and its openness. One loop over all rays;

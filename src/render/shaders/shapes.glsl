@@ -68,6 +68,11 @@ uint side_direction(uint side) {
 bool is_tilted(uint side) {
   return (side_flags(side) & kSideIsTilted) != 0;
 }
+// Returns the side of the voxel that a side lies on and faces; -1 if there is none.
+int side_of_voxel(uint side) {
+  bool faces_out = (side_flags(side) & kSideIsOnVoxel) != 0 && (side & kFromBehind) == 0 && !is_tilted(side);
+  return faces_out ? int(side_direction(side)) : -1;
+}
 
 // Returns the texture coordinates of a point of a side, 0 to 1 within the texture.
 vec2 side_place(uint side, vec3 point) {

@@ -80,10 +80,12 @@ LitPoint point_of_shape(Surface surface) {
   vec4 sun = f.sun;
   ivec4 home = f.instances[what.y].home;
   uint bits = what.x >> kShapeVoxelShift;
-  ivec4 voxel = ivec4(base.xyz + ivec3(bits & 63, bits >> 6 & 63, bits >> 12 & 63), home.w);
+  ivec3 local = ivec3(bits & 63, bits >> 6 & 63, bits >> 12 & 63);
+  ivec4 voxel = ivec4(base.xyz + local, home.w);
   vec3 from = place.xyz;
   if (home.w >= 0) from += frame().lift / placed_at(home.w).ref_view.w * edges.xyz;
-  LevelPlace at = LevelPlace(base.xyz + ivec3(floor(place.xyz)), fract(place.xyz), edges.xyz, -1);
+  int face = (what.x & kFacesOutOfVoxel) != 0 ? int(what.x & 7) : -1;
+  LevelPlace at = place_on_shape(voxel.xyz, place.xyz - vec3(local), edges.xyz, face);
   return LitPoint(voxel, base.xyz & ~63, vec3(base.xyz & 63) + from, normal, max(dot(normal, sun.xyz), 0.0),
                   surface.colour, surface.emitted, place.w, at);
 }

@@ -90,6 +90,7 @@ const uint kMixed = 3;  // quads and shapes in the order stored in memory
 
 // Bits of the vertex output `what.x` above the direction.
 const uint kIsShapeFace = 8;
+const uint kFacesOutOfVoxel = 16;  // it lies on the side of its voxel that it faces
 const uint kShapeVoxelShift = 8;
 
 // Returns true if edges of triangles are drawn.

@@ -47,7 +47,7 @@ LitPoint point_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
   if (kHasShapes && (body.what.z & kBeginsInShape) != 0) {
     vec3 in_grid = side_normal(body.what.y);
     vec3 above = vec3(body.voxel.xyz & 63) + inside + frame().lift / placed.ref_view.w * in_grid;
-    LevelPlace at = LevelPlace(body.voxel.xyz, inside, in_grid, -1);
+    LevelPlace at = place_on_shape(body.voxel.xyz, inside, in_grid, side_of_voxel(body.what.y));
     return LitPoint(body.voxel, body.voxel.xyz & ~63, above, normal, diffuse, surface.colour, surface.emitted, 1.0, at);
   }
   if (kHasFieldGlass && (body.what.z & kBeginsInField) != 0) {

@@ -16,6 +16,7 @@ const uint kNoLook = 7;  // instead of a type's face: the colour of the type
 const uint kNormalShift = 22;  // the direction nearest to the normal
 const uint kIsOpen = 1u << 25;  // the box lacks sides, so that the inner sides of others can be seen
 const uint kIsPlate = 1u << 26;  // another face is its other side
+const uint kIsOnVoxel = 1u << 27;  // it lies on a side of its voxel
 
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer ShapeRecords {
   ShapeRecord at[];
@@ -102,7 +103,9 @@ void put_shape(Seen seen, uvec2 records, uvec2 shapes, uint number, uint index, 
   base = ivec4(home.xyz + ivec3(offset), int(type));
   edges = vec4(is_behind ? -normal.xyz : normal.xyz, normal.w);
   if (is_behind) direction ^= 1;
-  what = uvec2(direction | kIsShapeFace | (words.x & 0x3FFFF) << kShapeVoxelShift, placed);
+  bool faces_out = !is_behind && (found.z & kIsOnVoxel) != 0;
+  what = uvec2(direction | kIsShapeFace | (faces_out ? kFacesOutOfVoxel : 0) | (words.x & 0x3FFFF) << kShapeVoxelShift,
+               placed);
   colour = vec4(uv, emission, 0.0);
   // Rows along x and columns along y of the coordinates.
   texels = has_look ? uvec4(found.xy, (found.z & (15u | 3u << kAlphaShift)) | 1u << 8 | kOwnLook, found.w) : uvec4(0);

@@ -8,6 +8,7 @@
 #include <quoin/render/propagated_light.h>
 
 #include "grid/shapes/shape_types_for_tests.h"
+#include "render/cpu/cave_for_tests.h"
 #include "render/vulkan/device/vulkan_for_tests.h"
 
 namespace quoin {
@@ -160,8 +161,7 @@ TEST_F(VulkanShapes, LightOfShapesMatchesCpu) {
   options = sized(160, 120);
   options.light.occlusion_mode = OcclusionMode::Vertex;
   compare(garden.scene, camera, options, "vertex");
-  options.light.model = LightModel::Propagated;
-  compare(garden.scene, camera, options, "propagated");
+  compare(Hall(true).scene, Hall::inside(), propagated(200, 150), "propagated");
   for (const Shading shading : {Shading::Unlit, Shading::Normals, Shading::Occlusion}) {
     options = sized(96, 72);
     options.light.shading = shading;

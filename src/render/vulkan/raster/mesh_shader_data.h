@@ -94,6 +94,7 @@ constexpr std::uint32_t kNoLook = 7;
 constexpr int kNormalShift = 22;
 constexpr std::uint32_t kIsOpen = std::uint32_t{1} << 25;
 constexpr std::uint32_t kIsPlate = std::uint32_t{1} << 26;
+constexpr std::uint32_t kIsOnVoxel = std::uint32_t{1} << 27;
 
 /// A visible face of a shape.
 struct ShaderShapeFace {

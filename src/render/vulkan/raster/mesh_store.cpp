@@ -144,6 +144,7 @@ ShaderShapeRecord shape_record(const ShapeModel& model, std::uint16_t number, co
   }
   record.normal = Vec4(face.normal, square_density(face));
   record.bits = openness_bits(model, number) | static_cast<std::uint32_t>(face.direction) << kNormalShift;
+  if (face.on_side) record.bits |= kIsOnVoxel;
   if (face.look < 6) {
     record.bits |= std::uint32_t{face.look} << kTypeLookShift;
     return record;

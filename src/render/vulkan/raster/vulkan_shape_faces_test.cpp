@@ -12,6 +12,7 @@
 
 #include "core/work/nightly_for_tests.h"
 #include "grid/shapes/shape_types_for_tests.h"
+#include "render/cpu/cave_for_tests.h"
 #include "render/vulkan/march/renderer_impl.h"
 #include "render/vulkan/raster/mesh_for_tests.h"
 
@@ -139,6 +140,11 @@ TEST_F(VulkanShapeFaces, ShadowsOnShapesMatchCpu) {
   RenderOptions options = sized(120, 90);
   options.light.occlusion_mode = OcclusionMode::Off;
   compare(scene, towards({9, 9, 12}, {0, 0, 0}), options, "shadows");
+}
+
+TEST_F(VulkanShapeFaces, PropagatedLightOnShapesMatchesCpu) {
+  const Hall hall(true);
+  compare(hall.scene, Hall::inside(), propagated(200, 150), "propagated");
 }
 
 TEST_F(VulkanShapeFaces, CubesTurnedByStateMatchCpu) {
