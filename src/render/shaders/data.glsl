@@ -96,9 +96,9 @@ struct Point {
 // entry t and exit t, voxels, and entry t from the start of the instance's ray. `what`: type, face, flags of its ends,
 // and the exit: 8 times the instance, plus the face. For a field the face is a normal, in the form of `packed_normal`.
 // For a shape that the ray enters, the face is one of shapes.glsl, and the voxel is the one that has the shape. With
-// kIsTextured in `what.x`, the last number of `lengths` has the bits of the texel where the ray enters. With kIsFace in
-// `what.x` it is a visible texel of a cell of faces: the voxel and the face are those of the lit side, and the face has
-// 8 times the cell's own face added.
+// kIsTextured in `what.x`, the last number of `lengths` has the bits of the texel where the ray enters. With kIsFace it
+// is a visible texel of a cell of faces: the voxel and the face are those of the lit side, and 8 times the cell's own
+// face is added.
 struct Body {
   ivec4 voxel;
   vec4 lengths;
