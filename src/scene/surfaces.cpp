@@ -283,7 +283,7 @@ bool meet_cell(const Surfaces& surfaces, GridReader& voxels, std::int32_t placed
   if (far_side.alpha == FaceAlpha::Translucent || !(span.t_exit <= max_t)) return true;
   if (is_hidden_by(voxels.get(span.behind))) return true;
   met.voxel = span.behind;
-  met.face = static_cast<Direction>(static_cast<int>(span.exit_face) ^ 1);
+  met.face = opposite(span.exit_face);
   met.side = static_cast<std::uint16_t>(span.exit_face);
   met.t = span.t_exit;
   return meet_side(far_side, ray_in_grid, span.behind - normal_of(span.exit_face), met, out);

@@ -48,6 +48,11 @@ inline constexpr std::array<FaceFrame, 6> kFaceFrames = {FaceFrame{0, +1, 1, 2},
   return n;
 }
 
+/// Returns the direction that points the other way.
+[[nodiscard]] constexpr Direction opposite(Direction d) {
+  return static_cast<Direction>(static_cast<unsigned>(d) ^ 1U);
+}
+
 /// Returns the direction closest to a vector. Ties prefer x over y over z. Returns PosX for the zero vector.
 [[nodiscard]] inline Direction nearest_direction(const DVec3& vector) {
   int axis = 0;

@@ -110,8 +110,6 @@ class SurroundingsFinder {
     return StairCorner::Straight;
   }
 
-  static Direction opposite(Direction direction) { return static_cast<Direction>(static_cast<int>(direction) ^ 1); }
-
   // Returns the height of a fluid in a voxel in ninths, or nullopt for other voxels. 9: the fluid fills its voxel.
   [[nodiscard]] std::optional<int> ninths(IVec3 voxel, VoxelType fluid) const {
     if (voxels_.get(voxel) != fluid) return std::nullopt;
@@ -208,7 +206,7 @@ bool covers(const VoxelRegistry& types, VoxelType neighbour, const ShapeModel* n
     // Both fluids have the same heights at their common corners.
     if (properties.shapes.rules().neighbours == ShapeNeighbours::Fluid) return true;
   }
-  const SideMask& side = neighbour_model->sides[static_cast<std::size_t>(direction) ^ 1U];
+  const SideMask& side = neighbour_model->sides[static_cast<std::size_t>(opposite(direction))];
   for (std::size_t i = 0; i < mask.size(); ++i) {
     if ((mask[i] & ~side[i]) != 0) return false;
   }

@@ -45,10 +45,6 @@ const ShapedVoxel* ShapedVoxels::at(const IVec3& local) const {
 
 namespace {
 
-Direction opposite(Direction direction) {
-  return static_cast<Direction>(static_cast<std::size_t>(direction) ^ 1U);
-}
-
 // The faces of a cube, by direction.
 struct CubeFaces {
   VoxelShapes shapes{VoxelShape::box(IVec3(0), IVec3(kShapeUnits))};

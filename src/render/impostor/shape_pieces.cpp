@@ -39,17 +39,13 @@ struct Cells {
   int bottom = 0;
 };
 
-Direction opposite_of(Direction direction) {
-  return static_cast<Direction>(static_cast<unsigned>(direction) ^ 1U);
-}
-
 // A side of a model in the plane of its direction's axes u and v, seen from the front or from behind.
 class FlatSide {
  public:
   FlatSide(const ModelFace& face, bool is_from_behind)
       : face_(&face),
         normal_(is_from_behind ? -face.normal : face.normal),
-        direction_(is_from_behind ? opposite_of(face.direction) : face.direction),
+        direction_(is_from_behind ? opposite(face.direction) : face.direction),
         frame_(&frame_of(direction_)),
         low_(face.corners[0]),
         high_(face.corners[0]) {
@@ -163,7 +159,7 @@ class ModelCutter {
       if (face < 0 || model_->faces[static_cast<std::size_t>(face)].is_inner) continue;
       cut(static_cast<std::size_t>(face), false);
       // A plate has its other side in front of the back of this one.
-      const bool has_back = box.faces[static_cast<std::size_t>(opposite_of(direction))] >= 0;
+      const bool has_back = box.faces[static_cast<std::size_t>(opposite(direction))] >= 0;
       if (is_plate ? !has_back : !is_closed) cut(static_cast<std::size_t>(face), true);
     }
   }
