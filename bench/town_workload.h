@@ -101,12 +101,8 @@ inline void place_house(Grid& grid, const TownTypes& types, IVec3 at) {
   }
 }
 
-/// Returns the town, with one instance at the origin.
-inline Scene town_scene(bool with_shapes) {
-  Scene scene;
-  const TownTypes types(scene.types, with_shapes);
-  SceneGrid town;
-  Grid& grid = town.grid;
+inline Grid town_grid(const TownTypes& types) {
+  Grid grid;
   for (int z = 0; z < kTownEdge; ++z) {
     for (int x = 0; x < kTownEdge; ++x) {
       const int height = town_height(x, z);
@@ -120,6 +116,14 @@ inline Scene town_scene(bool with_shapes) {
       if (town_number(x, z, 4) != 0) place_house(grid, types, {x, town_height(x + 4, z + 4), z});
     }
   }
+  return grid;
+}
+
+/// Returns the town, with one instance at the origin.
+inline Scene town_scene(bool with_shapes) {
+  Scene scene;
+  SceneGrid town;
+  town.grid = town_grid(TownTypes(scene.types, with_shapes));
   Instance instance;
   instance.grid = scene.add_grid(std::move(town));
   scene.add_instance(instance);

@@ -23,6 +23,16 @@ constexpr std::uint64_t even_bits(std::uint64_t bits) {
   return (bits | bits >> 16) & 0x0000'0000'FFFF'FFFFU;
 }
 
+/// Returns the number of a cell of a chunk: x + 64 y + 4096 z.
+[[nodiscard]] inline std::uint32_t number_of(IVec3 cell) {
+  return static_cast<std::uint32_t>(cell.x + kChunkEdge * (cell.y + kChunkEdge * cell.z));
+}
+/// The inverse of `number_of`.
+[[nodiscard]] inline IVec3 cell_of(std::uint32_t number) {
+  const auto n = static_cast<int>(number);
+  return {n % kChunkEdge, n / kChunkEdge % kChunkEdge, n / kChunkEdge / kChunkEdge};
+}
+
 /// The cubes around one chunk of a halved grid, and the cells that are solid for that reason. Cubes are all voxels
 /// except air and those with shapes.
 ///

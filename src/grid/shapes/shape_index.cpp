@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cstring>
 #include <map>
 #include <optional>
 #include <set>
@@ -13,6 +14,8 @@
 #include <glm/matrix.hpp>
 
 #include <quoin/core/assert.h>
+
+#include "grid/chunk/chunk_storage.h"
 
 namespace quoin {
 namespace {
@@ -118,29 +121,34 @@ class SurroundingsFinder {
     return (state & 8U) != 0 ? 9 : 8 - static_cast<int>(state & 7U);
   }
 
+  // A column of voxels next to a fluid's corner: `ninths`, or one of these.
+  static constexpr int kOpen = 0;
+  static constexpr int kSolid = -1;
+
   [[nodiscard]] std::array<std::uint8_t, 4> heights(IVec3 voxel, VoxelType fluid) const {
     if (ninths(voxel, fluid) == 9) return {16, 16, 16, 16};
-    std::array<std::uint8_t, 4> result{};
-    constexpr std::array<std::array<int, 2>, 4> kCorners = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
-    for (std::size_t i = 0; i < 4; ++i) result[i] = height_at(voxel + IVec3(kCorners[i][0], 0, kCorners[i][1]), fluid);
-    return result;
+    std::array<int, 9> columns{};  // (x, z) - 1 from the voxel: x + 3 z
+    for (std::size_t i = 0; i < 9; ++i) {
+      const IVec3 at = voxel + IVec3(static_cast<int>(i % 3) - 1, 0, static_cast<int>(i / 3) - 1);
+      columns[i] = ninths(at, fluid).value_or(types_.is_opaque(voxels_.get(at)) ? kSolid : kOpen);
+    }
+    return {height_at({columns[0], columns[1], columns[3], columns[4]}),
+            height_at({columns[1], columns[2], columns[4], columns[5]}),
+            height_at({columns[4], columns[5], columns[7], columns[8]}),
+            height_at({columns[3], columns[4], columns[6], columns[7]})};
   }
 
-  // Returns the height of a fluid at a corner that four voxels share, the greatest being `corner`, in sixteenths: their
-  // mean, in which full voxels count more, so that a lake is level up to its shore. Solid voxels do not count.
-  [[nodiscard]] std::uint8_t height_at(IVec3 corner, VoxelType fluid) const {
+  // Returns the height of a fluid at a corner that four columns share, in sixteenths: their mean, in which full voxels
+  // count more, so that a lake is level up to its shore. Solid voxels do not count.
+  [[nodiscard]] static std::uint8_t height_at(const std::array<int, 4>& columns) {
     int sum = 0;
     int weights = 0;
-    for (int i = 0; i < 4; ++i) {
-      const IVec3 at = corner - IVec3(i & 1, 0, i >> 1);
-      if (const std::optional<int> height = ninths(at, fluid)) {
-        if (*height == 9) return kShapeUnits;
-        const int weight = *height == 8 ? 10 : 1;
-        sum += weight * *height;
-        weights += weight;
-      } else if (!types_.is_opaque(voxels_.get(at))) {
-        ++weights;
-      }
+    for (const int height : columns) {
+      if (height == 9) return kShapeUnits;
+      if (height == kSolid) continue;
+      const int weight = height == 8 ? 10 : 1;
+      sum += weight * height;
+      weights += weight;
     }
     return static_cast<std::uint8_t>(weights == 0 ? kShapeUnits
                                                   : (sum * kShapeUnits + 9 * weights / 2) / (9 * weights));
@@ -194,6 +202,66 @@ const ShapeModel* shape_at(const Neighbourhood& chunks, const VoxelRegistry& typ
 const ShapeModel* shape_at(const Grid& grid, const VoxelRegistry& types, IVec3 voxel) {
   const GridVoxels voxels{grid};
   return SurroundingsFinder(voxels, types).model(voxel, grid.get(voxel));
+}
+
+NearPlanes::NearPlanes(const Neighbourhood& chunks)
+    : chunks_(chunks), types_(std::size_t{4} * kPlane), changes_(std::size_t{4} * kRow) {
+  const bool has_data = std::ranges::any_of(
+      chunks.chunks, [](const Chunk* chunk) { return chunk != nullptr && chunk->data_count() != 0; });
+  if (has_data) states_.resize(types_.size());
+}
+
+void NearPlanes::read(int z) {
+  QUOIN_ASSERT(z >= -1 && z <= kChunkEdge, "-1 <= z <= 64");
+  for (int y = -1; y <= kChunkEdge; ++y) {
+    const IVec3 of = chunk_of(IVec3{0, y, z});
+    const IVec3 local = local_of(IVec3{0, y, z});
+    VoxelType* const row = &types_[place_of({0, y, z})];
+    const Chunk* const chunk = chunks_.at(0, of.y, of.z);
+    if (chunk == nullptr) {
+      std::fill_n(row, kChunkEdge, kAir);
+    } else {
+      chunk->read_row(local.y, local.z, std::span<VoxelType, kChunkEdge>(row, std::size_t{kChunkEdge}));
+    }
+    row[-1] = chunks_.get({-1, y, z});
+    row[kChunkEdge] = chunks_.get({kChunkEdge, y, z});
+    std::uint64_t& changes = changes_[change_of(y, z)];
+    changes = changes_in(row);
+    if (states_.empty()) continue;
+    std::uint32_t* const states = &states_[place_of({0, y, z})];
+    std::fill_n(states, kChunkEdge, 0U);
+    states[-1] = chunks_.data({-1, y, z}).state;
+    states[kChunkEdge] = chunks_.data({kChunkEdge, y, z}).state;
+    if (chunk != nullptr) {
+      RowStates known = RowStates::of(*chunk, local.y, local.z);
+      for (; known.voxels != 0; known.voxels &= known.voxels - 1) {
+        states[std::countr_zero(known.voxels)] = *known.states++;
+      }
+    }
+    for (int x = 0; x < kChunkEdge; ++x) changes |= std::uint64_t{states[x] != states[x - 1]} << x;
+  }
+}
+
+std::uint64_t NearPlanes::changes_in(const VoxelType* row) {
+  std::array<std::uint64_t, kChunkEdge / 4> others;
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    std::uint64_t before = 0;
+    std::memcpy(&before, row + 4 * i - 1, sizeof(before));
+    std::memcpy(&others[i], row + 4 * i, sizeof(before));
+    others[i] ^= before;
+  }
+  return ~packed_row::equal_mask(others.data(), 16, 0);
+}
+
+std::uint64_t NearPlanes::repeated(int y, int z) const {
+  std::uint64_t changes = 0;
+  for (int i = 0; i < 9; ++i) changes |= changes_[change_of(y + i % 3 - 1, z + i / 3 - 1)];
+  constexpr std::uint64_t kEnds = std::uint64_t{1} << 63 | 1U;  // their neighbours are not compared
+  return ~(changes | changes << 1 | changes >> 1 | kEnds);
+}
+
+const ShapeModel* shape_at(const NearPlanes& planes, const VoxelRegistry& types, IVec3 local) {
+  return SurroundingsFinder(planes, types).model(local, planes.get(local));
 }
 
 bool covers(const VoxelRegistry& types, VoxelType neighbour, const ShapeModel* neighbour_model, VoxelType type,

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/changes.h>
 #include <quoin/grid/grid.h>
@@ -26,6 +27,48 @@ struct PlacedShape {
   VoxelType type = kAir;
   const ShapeModel* model = nullptr;
 };
+
+// Four planes of a chunk along z with one voxel around them, as plain arrays: for callers that look up the shapes of
+// most voxels of a chunk. A plane takes the place of the one four below it.
+//
+// Space: voxels of the chunk, -1 to 64 on each axis. Lifetime: as the neighbourhood.
+class NearPlanes {
+ public:
+  explicit NearPlanes(const Neighbourhood& chunks);
+
+  // Reads a plane, -1 <= z <= 64.
+  void read(int z);
+  // Returns the 64 voxels of a row. Requires, as `get` and `state`: the plane was read.
+  [[nodiscard]] std::span<const VoxelType, kChunkEdge> row(int y, int z) const {
+    return std::span<const VoxelType, kChunkEdge>(&types_[place_of({0, y, z})], std::size_t{kChunkEdge});
+  }
+  [[nodiscard]] VoxelType get(IVec3 at) const { return types_[place_of(at)]; }
+  // Returns the voxels of a row whose neighbourhoods of 3^3 types and states are equal to those of the voxel before, as
+  // bits: they have the same shape. Requires: the planes z - 1 to z + 1 were read, 0 <= y, z < 64.
+  [[nodiscard]] std::uint64_t repeated(int y, int z) const;
+  [[nodiscard]] std::uint32_t state(IVec3 at) const { return states_.empty() ? 0 : states_[place_of(at)]; }
+
+ private:
+  static constexpr int kRow = kChunkEdge + 2;
+  static constexpr int kPlane = kRow * kRow;
+
+  [[nodiscard]] static std::size_t place_of(IVec3 at) {
+    QUOIN_ASSERT((IBox{IVec3(-1), IVec3(kChunkEdge + 1)}.contains(at)), "-1 <= x, y, z <= 64");
+    return static_cast<std::size_t>((at.z & 3) * kPlane + (at.y + 1) * kRow + at.x + 1);
+  }
+
+  [[nodiscard]] static std::size_t change_of(int y, int z) { return static_cast<std::size_t>((z & 3) * kRow + y + 1); }
+  // Returns the voxels of a row whose type differs from that of the voxel before.
+  [[nodiscard]] static std::uint64_t changes_in(const VoxelType* row);
+
+  Neighbourhood chunks_;
+  BlockVector<VoxelType> types_;
+  BlockVector<std::uint64_t> changes_;  // by row: voxels whose type or state differs from that of the voxel before
+  BlockVector<std::uint32_t> states_;   // empty: all are 0
+};
+
+// As the functions of the public headers. Requires: the planes of the voxel and of its neighbours are read.
+[[nodiscard]] const ShapeModel* shape_at(const NearPlanes& planes, const VoxelRegistry& types, IVec3 local);
 
 // Returns the bounds of a box of a model, in voxels: the box itself unless it is tilted.
 [[nodiscard]] DBox bounds_of(const ModelBox& box);
