@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
+#include <quoin/core/changes.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
@@ -45,6 +47,18 @@ namespace [[gnu::visibility("default")]] quoin {
 /// side is glass. Other types are the same. Cost: O(types with shapes).
 [[nodiscard]] VoxelRegistry types_of_halved(const VoxelRegistry& types);
 
+/// The types for halved grids of one registry, made again only after its types have changed.
+class HalvedTypes {
+ public:
+  /// Returns `types` if no type has shapes, else `types_of_halved(types)`. Lifetime: until the next call; the registry
+  /// must outlive the result. Cost: O(1) if no type has changed since the last call with this registry or a snapshot.
+  [[nodiscard]] const VoxelRegistry& of(const VoxelRegistry& types);
+
+ private:
+  ChangeCursor cursor_;
+  std::optional<VoxelRegistry> cubes_;
+};
+
 /// Computes one chunk of `downsample(grid, types)`, by its chunk coordinates in the result.
 ///
 /// Reads only the voxels that its cells cover and two more on each side. An edit elsewhere does not change the result.
@@ -68,6 +82,9 @@ class GridPyramid {
   /// Lifetime: grid and types are read only during the call. The next call may use snapshots of them instead.
   /// Cost:     `downsample_chunk` for each chunk that an edit can affect.
   void update(const Grid& grid, const VoxelRegistry& types, int levels, Threads threads = {});
+  /// As above, for many pyramids that share `halved_types`. Requires: `halved_types` equals `types_of_halved(types)`.
+  void update(const Grid& grid, const VoxelRegistry& types, const VoxelRegistry& halved_types, int levels,
+              Threads threads = {});
 
   /// Returns the number of levels; 0 before the first update.
   [[nodiscard]] int levels() const;

@@ -459,6 +459,15 @@ VoxelRegistry types_of_halved(const VoxelRegistry& types) {
   return cubes;
 }
 
+const VoxelRegistry& HalvedTypes::of(const VoxelRegistry& types) {
+  if (!types.has_shapes()) return types;
+  if (!cubes_ || types.has_changed_since(cursor_)) {
+    cubes_ = types_of_halved(types);
+    cursor_ = types.cursor();
+  }
+  return *cubes_;
+}
+
 Chunk downsample_chunk(const Grid& grid, const VoxelRegistry& types, IVec3 chunk) {
   return ChunkHalver(grid, types, chunk).make();
 }
@@ -475,7 +484,9 @@ Result<DensityGrid> downsample(const DensityGrid& field, Threads threads, const 
   return std::move(level.content);
 }
 
-struct GridPyramid::Impl : Levels<VoxelHalving, VoxelLevel> {};
+struct GridPyramid::Impl : Levels<VoxelHalving, VoxelLevel> {
+  HalvedTypes halved_types;
+};
 
 GridPyramid::GridPyramid() : impl_(std::make_unique<Impl>()) {}
 GridPyramid::GridPyramid(GridPyramid&&) noexcept = default;
@@ -483,9 +494,12 @@ GridPyramid& GridPyramid::operator=(GridPyramid&&) noexcept = default;
 GridPyramid::~GridPyramid() = default;
 
 void GridPyramid::update(const Grid& grid, const VoxelRegistry& types, int levels, Threads threads) {
-  std::optional<VoxelRegistry> cubes;
-  if (types.has_shapes()) cubes = types_of_halved(types);
-  impl_of(impl_).update(grid, {&types}, {cubes ? &*cubes : &types}, levels, threads);
+  update(grid, types, impl_of(impl_).halved_types.of(types), levels, threads);
+}
+
+void GridPyramid::update(const Grid& grid, const VoxelRegistry& types, const VoxelRegistry& halved_types, int levels,
+                         Threads threads) {
+  impl_of(impl_).update(grid, {&types}, {&halved_types}, levels, threads);
 }
 
 int GridPyramid::levels() const {

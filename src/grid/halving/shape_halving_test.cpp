@@ -157,6 +157,30 @@ TEST(ShapeHalving, TypesOfHalvedGridsAreCubes) {
   EXPECT_EQ(mean_of_shapes(striped).z, 0.0F);
 }
 
+TEST(ShapeHalving, TypesAreKeptUntilTheyChange) {
+  VoxelRegistry plain;
+  ASSERT_TRUE(plain.add({.name = "stone"}));
+  HalvedTypes halved;
+  EXPECT_EQ(&halved.of(plain), &plain);
+  VoxelRegistry types;
+  const ShapeTypes t(types);
+  const VoxelRegistry& cubes = halved.of(types);
+  EXPECT_FALSE(cubes.has_shapes());
+  const VoxelProperties* const kept = &cubes[t.slab];
+  EXPECT_EQ(&halved.of(types)[t.slab], kept);
+  const VoxelRegistry snapshot = types;
+  EXPECT_EQ(&halved.of(snapshot)[t.slab], kept);
+  VoxelProperties red = types[t.slab];
+  red.colour = {255, 0, 0};
+  types.replace(t.slab, red);
+  EXPECT_EQ(halved.of(types)[t.slab].colour, types_of_halved(types)[t.slab].colour);
+  EXPECT_EQ(halved.of(types)[t.slab].colour, red.colour);
+  EXPECT_NE(halved.of(snapshot)[t.slab].colour, red.colour) << "another registry by now";
+  VoxelRegistry fewer;
+  ASSERT_TRUE(fewer.add(types[t.fence]));
+  EXPECT_EQ(halved.of(fewer).size(), fewer.size());
+}
+
 TEST(ShapeHalving, KeepsStatesThatTurn) {
   VoxelRegistry types;
   const VoxelType furnace =

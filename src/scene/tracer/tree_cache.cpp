@@ -293,10 +293,10 @@ void CoarseLevel::put_in(PlacedGrid& placed) const {
   placed.level = level;
 }
 
-void HalvedGridCache::Entry::make(const SceneGrid& grid, const VoxelRegistry& types, int halvings, Threads threads) {
+void HalvedGridCache::Entry::make(const SceneGrid& grid, const Types& types, int halvings, Threads threads) {
   PendingChanges changes(followed, grid.grid);
   PendingChanges field_changes(followed_field, grid.field);
-  const GridData states{types.has_shapes() || types.has_turned_by_state() ? &grid.grid : nullptr};
+  const GridData states{types.full.has_shapes() || types.full.has_turned_by_state() ? &grid.grid : nullptr};
   PendingChanges state_changes(followed_states, states);
   if (changes->all || field_changes->all || state_changes->all) {
     *this = {};
@@ -307,20 +307,20 @@ void HalvedGridCache::Entry::make(const SceneGrid& grid, const VoxelRegistry& ty
   changes.commit();
   field_changes.commit();
   const int known = static_cast<int>(levels.size());
-  if (known < halvings && !is_coarsest) is_coarsest = has_glass(grid.field, types);
+  if (known < halvings && !is_coarsest) is_coarsest = has_glass(grid.field, types.full);
   for (int level = known + 1; level <= halvings && !is_coarsest; ++level) {
-    pyramid.update(grid.grid, types, level, threads);
+    pyramid.update(grid.grid, types.full, types.halved, level, threads);
     fields.update(grid.field, level, threads);
     is_coarsest = !take_level(grid, types, level);
   }
 }
 
 // Updates the existing levels after an edit.
-void HalvedGridCache::Entry::renew(const SceneGrid& grid, const VoxelRegistry& types, Threads threads) {
-  is_coarsest = has_glass(grid.field, types);
+void HalvedGridCache::Entry::renew(const SceneGrid& grid, const Types& types, Threads threads) {
+  is_coarsest = has_glass(grid.field, types.full);
   if (is_coarsest) return levels.clear();
   const int most = std::max(pyramid.levels(), fields.levels());
-  pyramid.update(grid.grid, types, most, threads);
+  pyramid.update(grid.grid, types.full, types.halved, most, threads);
   fields.update(grid.field, most, threads);
   for (int level = 1; level <= most && !is_coarsest; ++level) is_coarsest = !take_level(grid, types, level);
 }
@@ -337,7 +337,7 @@ bool HalvedGridCache::Entry::is_alike(const SceneGrid& grid, int halvings) const
 
 // Adds a level of the pyramids if it is similar to the grid. Otherwise removes it and all coarser levels, and returns
 // false.
-bool HalvedGridCache::Entry::take_level(const SceneGrid& grid, const VoxelRegistry& types, int halvings) {
+bool HalvedGridCache::Entry::take_level(const SceneGrid& grid, const Types& types, int halvings) {
   QUOIN_ASSERT(halvings >= 1, "1 <= halvings");
   const auto index = static_cast<std::size_t>(halvings - 1);
   if (!is_alike(grid, halvings)) {
@@ -351,10 +351,8 @@ bool HalvedGridCache::Entry::take_level(const SceneGrid& grid, const VoxelRegist
   level.field = grid.field.chunk_count() != 0 ? &fields.level(halvings) : nullptr;
   level.level = halvings;
   const DensityGrid& field = level.field == nullptr ? no_field() : *level.field;
-  std::optional<VoxelRegistry> cubes;
-  if (types.has_shapes()) cubes = types_of_halved(types);
-  level.trees.update(*level.voxels, cubes ? *cubes : types);
-  level.trees.update(field, types);
+  level.trees.update(*level.voxels, types.halved);
+  level.trees.update(field, types.full);
   level.tight = unite(level.voxels->bounds(), field.bounds());
   return true;
 }
@@ -377,10 +375,12 @@ HalvedGridCache::Lock HalvedGridCache::make(const Scene& scene, std::span<const 
   }
   std::vector<std::pair<GridHandle, int>> tasks(wanted.begin(), wanted.end());
   for (const auto& [grid, halvings] : tasks) entries_[grid];
+  if (tasks.empty()) return lock;
+  const Types types{scene.types, halved_types_.of(scene.types)};
   const Threads inner = tasks.size() > 1 ? Threads{1} : threads;
   parallel_for(tasks.size(), threads, [&](std::size_t i) {
     const auto& [handle, halvings] = tasks[i];
-    entries_.find(handle)->second.make(scene.grids()[handle], scene.types, halvings, inner);
+    entries_.find(handle)->second.make(scene.grids()[handle], types, halvings, inner);
   });
   return lock;
 }

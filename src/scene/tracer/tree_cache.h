@@ -167,6 +167,10 @@ struct CoarseLevel {
 /// up the shore of a lake.
 /// Threads: all functions may run concurrently.
 class HalvedGridCache {
+  struct Types {
+    const VoxelRegistry& full;
+    const VoxelRegistry& halved;  ///< of all levels
+  };
   struct Entry {
     ChangeCursor followed;
     ChangeCursor followed_field;
@@ -176,10 +180,10 @@ class HalvedGridCache {
     Grid no_voxels;
     std::vector<std::unique_ptr<CoarseLevel>> levels;  // the first is halved once
     bool is_coarsest = false;                          // no coarser level is similar to the grid
-    void make(const SceneGrid& grid, const VoxelRegistry& types, int halvings, Threads threads);
-    void renew(const SceneGrid& grid, const VoxelRegistry& types, Threads threads);
+    void make(const SceneGrid& grid, const Types& types, int halvings, Threads threads);
+    void renew(const SceneGrid& grid, const Types& types, Threads threads);
     [[nodiscard]] bool is_alike(const SceneGrid& grid, int halvings) const;
-    bool take_level(const SceneGrid& grid, const VoxelRegistry& types, int halvings);
+    bool take_level(const SceneGrid& grid, const Types& types, int halvings);
   };
 
  public:
@@ -213,6 +217,7 @@ class HalvedGridCache {
  private:
   mutable std::mutex mutex_;
   std::map<GridHandle, Entry> entries_;
+  HalvedTypes halved_types_;
 };
 
 }  // namespace quoin
