@@ -118,6 +118,9 @@ std::int64_t allocations_of_this_thread() {
 std::int64_t large_frees_of_this_thread() {
   return large_frees;
 }
+std::int64_t fail_allocation(std::int64_t n) {
+  return std::exchange(allocations_left, n);
+}
 
 namespace {
 
@@ -304,11 +307,9 @@ void expect_recovery(Busy& busy, const std::function<void()>& update, const std:
     } catch (const std::bad_alloc&) {
       has_failed = true;
     }
-    const std::int64_t left = std::exchange(allocations_left, -1);
-    if (left == n) {
-      ++idle;
-      continue;
-    }
+    const std::int64_t left = fail_allocation(-1);
+    idle += left == n ? 1 : 0;
+    if (left == n) continue;
     if (left < 0) last_reached = n;
     failures += has_failed ? 1 : 0;
     if (n % 3 == 0) busy.edit();
@@ -323,9 +324,9 @@ TEST(FailedAllocations, IncludeBlocksOfTheFunctions) {
   if (!are_functions_wanted()) GTEST_SKIP() << "QUOIN_TEST_BLOCK_FUNCTIONS is not set";
   ASSERT_TRUE(functions_of_program.are_set) << "a large block was made before main";
   BlockVector<std::byte> block(2 * kLargeBlock, std::byte{9});
-  allocations_left = 0;
+  fail_allocation(0);
   EXPECT_THROW(block.resize(3 * kLargeBlock), std::bad_alloc);
-  allocations_left = -1;
+  fail_allocation(-1);
   EXPECT_EQ(block, BlockVector<std::byte>(2 * kLargeBlock, std::byte{9}));
 }
 
@@ -400,12 +401,12 @@ TEST(FailedAllocations, KeepSolidShapes) {
       busy,
       [&] {
         const std::vector<IVec3> changed = shapes.update(busy.grid(), busy.scene.types, {1});
-        const std::int64_t left = std::exchange(allocations_left, -1);
+        const std::int64_t left = fail_allocation(-1);
         for (const IVec3 chunk : changed) {
           held[chunk] = shapes.boxes(chunk);
           if (held[chunk].empty()) held.erase(chunk);
         }
-        allocations_left = left;
+        fail_allocation(left);
       },
       [&] {
         SolidShapes fresh;

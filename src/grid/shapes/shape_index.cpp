@@ -447,17 +447,17 @@ class ShapeIndex::Lists {
   std::unordered_map<const ShapeModel*, std::uint32_t> models_;
 };
 
-std::shared_ptr<const ShapeIndex::ChunkShapes> ShapeIndex::made(const Grid& grid, IVec3 chunk) const {
+std::shared_ptr<const ShapeIndex::ChunkShapes> ShapeIndex::made(const Grid& grid, const Types& types, IVec3 chunk) {
   const Neighbourhood near = grid.neighbourhood(chunk);
   std::array<bool, 27> is_read{};
   bool is_any = false;
-  for (std::size_t i = 0; i < 27; ++i) is_any |= is_read[i] = has_shapes(near.chunks[i], types_);
+  for (std::size_t i = 0; i < 27; ++i) is_any |= is_read[i] = has_shapes(near.chunks[i], types.registry);
   if (!is_any) return nullptr;
 
   auto result = std::make_shared<ChunkShapes>();
-  Lists lists(types_, *result);
+  Lists lists(types.registry, *result);
   const NearVoxels voxels{near};
-  const SurroundingsFinder finder(voxels, types_);
+  const SurroundingsFinder finder(voxels, types.registry);
   std::array<VoxelType, kChunkEdge> row;
   const auto add = [&](IVec3 local, VoxelType type) {
     const ShapeModel& model = *finder.model(local, type);
@@ -477,7 +477,7 @@ std::shared_ptr<const ShapeIndex::ChunkShapes> ShapeIndex::made(const Grid& grid
         const int end = dx > 0 ? 1 : kChunkEdge;
         for (int x = begin; x < end; ++x) {
           const VoxelType type = row[static_cast<std::size_t>(x)];
-          if (type < is_shaped_.size() && is_shaped_[type] != 0) add(first + IVec3(x, 0, 0), type);
+          if (type < types.is_shaped.size() && types.is_shaped[type] != 0) add(first + IVec3(x, 0, 0), type);
         }
       }
     }
@@ -485,32 +485,27 @@ std::shared_ptr<const ShapeIndex::ChunkShapes> ShapeIndex::made(const Grid& grid
   return lists.finish(chunk * kChunkEdge) ? result : nullptr;
 }
 
-void ShapeIndex::rebuild(const Grid& grid, IVec3 chunk) {
-  if (std::shared_ptr<const ChunkShapes> shapes = made(grid, chunk)) {
-    chunks_[chunk] = std::move(shapes);
-  } else {
-    chunks_.erase(chunk);
-  }
-}
-
-void ShapeIndex::take_types(const VoxelRegistry& types) {
-  types_ = types;
-  is_shaped_.assign(types.has_shapes() ? types.size() : 0, 0);
-  for (std::size_t type = 0; type < is_shaped_.size(); ++type) {
-    is_shaped_[type] = types.is_shaped(static_cast<VoxelType>(type)) ? 1 : 0;
+ShapeIndex::Types::Types(const VoxelRegistry& types)
+    : registry(types), is_shaped(types.has_shapes() ? types.size() : 0) {
+  for (std::size_t type = 0; type < is_shaped.size(); ++type) {
+    is_shaped[type] = types.is_shaped(static_cast<VoxelType>(type)) ? 1 : 0;
   }
 }
 
 void ShapeIndex::build(const Grid& grid, const VoxelRegistry& types) {
-  chunks_.clear();
-  take_types(types);
-  if (is_shaped_.empty()) return;
+  ShapeIndex next;
+  next.types_ = Types(types);
   std::set<IVec3, ByZyx> chunks;  // with shapes, and around them
-  for (const IVec3 chunk : grid.chunks()) {
-    if (!has_shapes(grid.find_chunk(chunk), types_)) continue;
+  for (const IVec3 chunk : types.has_shapes() ? grid.chunks() : std::vector<IVec3>()) {
+    if (!has_shapes(grid.find_chunk(chunk), types)) continue;
     for (int i = 0; i < 27; ++i) chunks.insert(chunk + Neighbourhood::offset(i));
   }
-  for (const IVec3 chunk : chunks) rebuild(grid, chunk);
+  for (const IVec3 chunk : chunks) {
+    if (std::shared_ptr<const ChunkShapes> shapes = made(grid, next.types_, chunk)) {
+      next.chunks_.emplace(chunk, std::move(shapes));
+    }
+  }
+  *this = std::move(next);
 }
 
 std::vector<IVec3> ShapeIndex::chunks() const {
@@ -525,14 +520,20 @@ std::vector<IVec3> ShapeIndex::update(const Grid& grid, const VoxelRegistry& typ
                                       const DataChanges& data) {
   std::set<IVec3, ByZyx> chunks;
   if (changes.all || data.all) {
+    ShapeIndex next;
+    next.build(grid, types);
     for (const auto& [chunk, shapes] : chunks_) chunks.insert(chunk);
-    build(grid, types);
-    for (const auto& [chunk, shapes] : chunks_) chunks.insert(chunk);
-    return {chunks.begin(), chunks.end()};
+    for (const auto& [chunk, shapes] : next.chunks_) chunks.insert(chunk);
+    std::vector<IVec3> all(chunks.begin(), chunks.end());
+    *this = std::move(next);
+    return all;
   }
   // No voxel has a new type except within the changes.
-  take_types(types);
-  if (is_shaped_.empty()) return {};
+  Types next(types);
+  if (next.is_shaped.empty()) {
+    types_ = std::move(next);
+    return {};
+  }
   const auto add = [&](IVec3 chunk, const IBox& box) {
     // A shape follows its neighbours and reaches one voxel outside.
     const IVec3 origin = chunk * kChunkEdge;
@@ -546,8 +547,17 @@ std::vector<IVec3> ShapeIndex::update(const Grid& grid, const VoxelRegistry& typ
   };
   for (const ChunkChange& change : changes.items_unless_all()) add(change.chunk, change.box);
   for (const DataChange& change : data.items_unless_all()) add(change.chunk, change.box);
-  for (const IVec3 chunk : chunks) rebuild(grid, chunk);
-  return {chunks.begin(), chunks.end()};
+  Chunks fresh;
+  for (const IVec3 chunk : chunks) {
+    if (std::shared_ptr<const ChunkShapes> shapes = made(grid, next, chunk)) fresh.emplace(chunk, std::move(shapes));
+  }
+  std::vector<IVec3> all(chunks.begin(), chunks.end());
+  chunks_.reserve(chunks_.size() + fresh.size());
+  // From here on nothing throws: there is room, and nodes are moved.
+  types_ = std::move(next);
+  for (const IVec3 chunk : all) chunks_.erase(chunk);
+  chunks_.merge(fresh);
+  return all;
 }
 
 ShapesAtVoxel ShapeIndex::at(IVec3 voxel) const {

@@ -198,7 +198,7 @@ class ShapeIndex {
   void build(const Grid& grid, const VoxelRegistry& types);
   // Applies edits of the grid and of its data. Returns the chunks whose touched voxels may have changed, by z, y, x.
   // Requires: as OccupancyTree::update; if any type's shapes have changed, `changes.all` is true.
-  // Cost: O(rows) per chunk within two voxels of a change.
+  // Cost: O(rows) per chunk within two voxels of a change. If it throws, nothing changes, as for `build`.
   std::vector<IVec3> update(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes,
                             const DataChanges& data);
 
@@ -287,13 +287,20 @@ class ShapeIndex {
   };
   class Lists;
 
-  [[nodiscard]] std::shared_ptr<const ChunkShapes> made(const Grid& grid, IVec3 chunk) const;
-  void rebuild(const Grid& grid, IVec3 chunk);
-  void take_types(const VoxelRegistry& types);
+  using Chunks = std::unordered_map<IVec3, std::shared_ptr<const ChunkShapes>, CoordinateHash>;
+  struct Types {
+    VoxelRegistry registry;  // keeps the models
+    std::vector<std::uint8_t> is_shaped;
 
-  VoxelRegistry types_;  // keeps the models
-  std::vector<std::uint8_t> is_shaped_;
-  std::unordered_map<IVec3, std::shared_ptr<const ChunkShapes>, CoordinateHash> chunks_;
+    Types() = default;
+    explicit Types(const VoxelRegistry& types);
+  };
+
+  // Returns the shapes of a chunk, or null if there are none.
+  [[nodiscard]] static std::shared_ptr<const ChunkShapes> made(const Grid& grid, const Types& types, IVec3 chunk);
+
+  Types types_;
+  Chunks chunks_;
 };
 
 }  // namespace quoin

@@ -16,6 +16,7 @@
 
 #include "grid/shapes/shape_index.h"
 #include "grid/shapes/shape_types_for_tests.h"
+#include "live/allocations_for_tests.h"
 
 namespace quoin {
 namespace {
@@ -445,6 +446,48 @@ TEST(ShapeIndex, ListsShapesInVoxelsThatTheyTouchAndFollowsEdits) {
   ShapeIndex fresh;
   fresh.build(grid, types);
   EXPECT_EQ(index.bounds(), fresh.bounds());
+}
+
+// A state turns a beam away from a chunk that it touched before.
+TEST(ShapeIndex, FailedUpdateChangesNothing) {
+  VoxelRegistry types;
+  VoxelProperties of_beam{.name = "beam", .state_bits = 2};
+  of_beam.orientations = StateOrientations::about_y();
+  of_beam.shapes = *VoxelShape::from_elements({{.min = {0, 4, 4}, .max = {32, 8, 8}}});
+  const VoxelType beam = *types.add(of_beam);
+  Grid grid;
+  grid.set({63, 5, 5}, beam);
+  grid.set({200, 5, 5}, beam);
+  for (const bool is_all : {false, true}) {
+    ASSERT_TRUE(grid.set_data({63, 5, 5}, {.state = 0}) == is_all);
+    ShapeIndex index;
+    index.build(grid, types);
+    ASSERT_TRUE(index.touches({64, 5, 5}));
+    ASSERT_TRUE(index.at({199, 5, 5}).empty());
+    const std::vector<IVec3> before = index.chunks();
+    ChangeCursor cursor = grid.cursor();
+    grid.set_data({63, 5, 5}, {.state = 2});
+    DataChanges changes;
+    if (is_all) {
+      changes.all = true;
+    } else {
+      changes = grid.data_changes_since(cursor);
+      ASSERT_FALSE(changes.empty());
+    }
+    std::vector<IVec3> changed;
+    const int failures = fail_each_allocation([&] { changed = index.update(grid, types, {}, changes); },
+                                              [&] {
+                                                EXPECT_EQ(index.chunks(), before);
+                                                EXPECT_TRUE(index.touches({64, 5, 5}));
+                                                EXPECT_TRUE(index.touches({200, 5, 5}));
+                                              });
+    EXPECT_GT(failures, 10);
+    EXPECT_FALSE(index.touches({64, 5, 5}));
+    EXPECT_TRUE(index.touches({62, 5, 5}));
+    EXPECT_TRUE(index.touches({200, 5, 5}));
+    EXPECT_NE(std::ranges::find(changed, IVec3(1, 0, 0)), changed.end())
+        << "it is listed although it has no shapes left";
+  }
 }
 
 // Lists the shapes that touch a voxel, as ShapeIndex::at does.

@@ -1,6 +1,7 @@
 #include <array>
 #include <cstddef>
 #include <memory>
+#include <new>
 #include <utility>
 #include <vector>
 
@@ -8,6 +9,7 @@
 
 #include "core/work/nightly_for_tests.h"
 #include "grid/change_follower_for_tests.h"
+#include "live/allocations_for_tests.h"
 #include "scene/tracer/changing_scene_for_tests.h"
 
 namespace quoin {
@@ -220,6 +222,42 @@ TEST(SceneUpdate, OtherConsumersMissNoChanges) {
   (void)follower.take(grid);
   tracer.update();
   EXPECT_FALSE(placed_in(tracer)[0].opaque->is_occupied({6, 5, 5}));
+}
+
+// A state turns a beam away from a chunk that it touched before: no trees keep its old voxels, also if memory runs out.
+TEST(TreeCache, RecoversFromFailedUpdatesOfShapes) {
+  VoxelRegistry types;
+  VoxelProperties of_beam{.name = "beam", .state_bits = 2};
+  of_beam.orientations = StateOrientations::about_y();
+  of_beam.shapes = *VoxelShape::from_elements({{.min = {0, 4, 4}, .max = {32, 8, 8}}});
+  const VoxelType beam = *types.add(of_beam);
+  Grid grid;
+  grid.set({63, 5, 5}, beam);
+  grid.set({200, 5, 5}, beam);
+  int failures = 0;
+  for (int n = 0; n == failures; ++n) {
+    grid.set_data({63, 5, 5}, {.state = 0});
+    TreeCache trees(ShapedVoxels::ByShape);
+    trees.update(grid, types);
+    ASSERT_TRUE(trees.shapes()->touched.is_occupied({64, 5, 5}));
+    grid.set_data({63, 5, 5}, {.state = 2});
+    fail_allocation(n);
+    try {
+      trees.update(grid, types);
+    } catch (const std::bad_alloc&) {
+      ++failures;
+    }
+    fail_allocation(-1);
+    trees.update(grid, types);
+    ASSERT_NE(trees.shapes(), nullptr) << n;
+    for (const OccupancyTree* tree : {&trees.shapes()->touched, &trees.shapes()->solid}) {
+      ASSERT_FALSE(tree->is_occupied({64, 5, 5})) << n;
+      ASSERT_TRUE(tree->is_occupied({62, 5, 5})) << n;
+      ASSERT_TRUE(tree->is_occupied({200, 5, 5})) << n;
+    }
+    ASSERT_FALSE(trees.update(grid, types)) << n;
+  }
+  EXPECT_GT(failures, 10);
 }
 
 }  // namespace

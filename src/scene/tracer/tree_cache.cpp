@@ -193,6 +193,8 @@ bool TreeCache::update_shapes(const Grid& grid, const VoxelRegistry& types, cons
   const GridData data{&grid};
   PendingChanges data_changes(followed_data_, data);
   if (changes.empty() && data_changes->empty()) return false;
+  // If an update fails, the parts of `shapes_` differ: the next one makes all again, also without edits of voxels.
+  const ChangeCursor followed = std::exchange(followed_, {});
   if (is_new) shapes_ = std::make_unique<TracedShapes>();
   const std::vector<IVec3> changed = shapes_->index.update(grid, types, changes, *data_changes);
   const TracedShapes& shapes = *shapes_;
@@ -205,6 +207,7 @@ bool TreeCache::update_shapes(const Grid& grid, const VoxelRegistry& types, cons
   if (!shapes_->is_glass.empty()) shapes_->glass.update(changed, glass_rows);
   if (shapes_->index.empty()) shapes_.reset();
   data_changes.commit();
+  followed_ = followed;
   return true;
 }
 
