@@ -564,7 +564,8 @@ QUOIN_API quoin_status quoin_grid_add(quoin_scene scene, const quoin_array* arra
 QUOIN_API quoin_status quoin_grid_read_states(quoin_scene scene, size_t grid, const int32_t min[3],
                                               const int32_t shape[3], uint32_t* out, size_t capacity);
 /* Replaces the states of a box with an array of QUOIN_UINT8, QUOIN_UINT16 or QUOIN_UINT32, otherwise as
- * quoin_grid_write. Air ignores them. If a state has bits beyond its type's state_bits, nothing changes. */
+ * quoin_grid_write. Air ignores them. If it fails, nothing changes: also if a state has bits beyond its type's
+ * state_bits. */
 QUOIN_API quoin_status quoin_grid_write_states(quoin_scene scene, size_t grid, const quoin_array* array);
 
 /* Sets how world files (.quoin) store a grid: the fields `unsaved` and `whole` of quoin_grid_info. */

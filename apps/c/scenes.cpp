@@ -134,7 +134,7 @@ quoin_status write_grid(SceneBody& scene, GridHandle grid, const quoin_array& ar
   return QUOIN_OK;
 }
 
-// Check all states first: if a type lacks the bits of one, nothing changes.
+// Check all states first: if a type lacks the bits of one, nothing changes. If memory runs out, nothing changes either.
 quoin_status write_states(SceneBody& scene, GridHandle handle, const quoin_array& array) {
   const VoxelRegistry& types = scene.loaded.scene.types;
   const Grid& before = scene.loaded.scene.grids()[handle].grid;
@@ -160,8 +160,14 @@ quoin_status write_states(SceneBody& scene, GridHandle handle, const quoin_array
   }
   if (changes.empty()) return QUOIN_OK;
   Grid& grid = scene.loaded.scene.edit(handle).grid;
-  for (const auto& [voxel, state] : changes)
-    grid.set(voxel, grid.get(voxel), {.state = state, .bytes = grid.data(voxel).bytes});
+  Grid unchanged = grid.snapshot();
+  try {
+    for (const auto& [voxel, state] : changes)
+      grid.set(voxel, grid.get(voxel), {.state = state, .bytes = grid.data(voxel).bytes});
+  } catch (...) {
+    grid = std::move(unchanged);
+    throw;
+  }
   return QUOIN_OK;
 }
 

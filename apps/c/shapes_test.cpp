@@ -4,8 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -13,6 +15,25 @@
 
 #include "quoin.h"
 #include "structs_for_tests.h"
+
+namespace {
+
+thread_local std::int64_t allocations_left = -1;  // before one fails; negative: none fails
+
+}  // namespace
+
+// The library calls the operators of the test program.
+[[gnu::noinline]] void* operator new(std::size_t bytes) {
+  if (allocations_left >= 0 && allocations_left-- == 0) throw std::bad_alloc();
+  if (void* const memory = std::malloc(bytes == 0 ? 1 : bytes)) return memory;
+  throw std::bad_alloc();
+}
+[[gnu::noinline]] void operator delete(void* memory) noexcept {
+  std::free(memory);
+}
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
 
 namespace {
 
@@ -424,6 +445,45 @@ TEST_F(CShapes, StatesStayWhenTypesDeclareFewerBits) {
   EXPECT_NE(std::string(quoin_last_error()).find("more than the 3 bits"), std::string::npos) << quoin_last_error();
   ASSERT_EQ(write({0, 1, 0, 0}), QUOIN_OK);
   EXPECT_EQ(quoin_scene_save(scene_, path.c_str()), QUOIN_OK) << quoin_last_error();
+}
+
+TEST_F(CShapes, FailedWritesOfStatesChangeNothing) {
+  // Three chunks along x, without a state at first and with some later.
+  const std::vector<std::uint8_t> stairs(150, 2);
+  auto array = sized<quoin_array>();
+  array.data = stairs.data();
+  array.shape[0] = static_cast<std::int64_t>(stairs.size());
+  array.shape[1] = array.shape[2] = 1;
+  std::size_t grid = 0;
+  ASSERT_EQ(quoin_grid_add(scene_, &array, nullptr, &grid), QUOIN_OK) << quoin_last_error();
+  const auto read = [&] {
+    const std::array<std::int32_t, 3> min{0, 0, 0};
+    const std::array<std::int32_t, 3> shape{150, 1, 1};
+    std::vector<std::uint32_t> all(150, 99);
+    EXPECT_EQ(quoin_grid_read_states(scene_, grid, min.data(), shape.data(), all.data(), all.size()), QUOIN_OK);
+    return all;
+  };
+  std::vector<std::uint32_t> before(150, 0);
+  for (const std::uint32_t turn : {1U, 2U}) {
+    std::vector<std::uint32_t> states(150);
+    for (std::size_t i = 0; i < states.size(); ++i) states[i] = (turn * static_cast<std::uint32_t>(i)) % 16U;
+    array.data = states.data();
+    array.scalar = QUOIN_UINT32;
+    int failures = 0;
+    quoin_status status = QUOIN_OUT_OF_MEMORY;
+    for (std::int64_t n = 0; status != QUOIN_OK; ++n) {
+      allocations_left = n;
+      status = quoin_grid_write_states(scene_, grid, &array);
+      allocations_left = -1;
+      if (status == QUOIN_OK) break;
+      ASSERT_EQ(status, QUOIN_OUT_OF_MEMORY);
+      ASSERT_EQ(read(), before) << "allocation " << n << " failed";
+      ++failures;
+    }
+    EXPECT_GT(failures, 5);
+    EXPECT_EQ(read(), states);
+    before = states;
+  }
 }
 
 TEST_F(CShapes, TypesDeclareStateBits) {
