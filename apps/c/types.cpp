@@ -161,6 +161,20 @@ quoin_status change_type(quoin_scene scene, std::size_t type, Change&& change) n
   });
 }
 
+// Replaces a member of a type's properties by `read(given)`, or by its default if `given` is null.
+template <class Member, class Given>
+quoin_status set_member(quoin_scene scene, std::size_t type, Member VoxelProperties::*member, const Given* given,
+                        Result<Member> (*read)(const Given*)) noexcept {
+  return change_type(scene, type, [&](VoxelProperties& changed) -> Status {
+    changed.*member = {};
+    if (given == nullptr) return {};
+    Result<Member> made = read(given);
+    if (!made) return made.error();
+    changed.*member = std::move(*made);
+    return {};
+  });
+}
+
 StateOrientations preset_of(std::int32_t kind, std::uint8_t first_bit) {
   switch (kind) {
     case QUOIN_ORIENTATIONS_ABOUT_Y:
@@ -518,14 +532,7 @@ quoin_status quoin_type_set(quoin_scene scene, std::size_t index, const quoin_ty
 }
 
 quoin_status quoin_type_set_faces(quoin_scene scene, std::size_t type, const quoin_face* faces) {
-  return change_type(scene, type, [&](VoxelProperties& changed) -> Status {
-    changed.faces = {};
-    if (faces == nullptr) return {};
-    auto given = faces_of(faces);
-    if (!given) return given.error();
-    changed.faces = std::move(*given);
-    return {};
-  });
+  return set_member(scene, type, &VoxelProperties::faces, faces, faces_of);
 }
 
 quoin_status quoin_type_get_orientations(quoin_scene scene, std::size_t type, quoin_orientations* out) {
@@ -536,14 +543,7 @@ quoin_status quoin_type_get_orientations(quoin_scene scene, std::size_t type, qu
 }
 
 quoin_status quoin_type_set_orientations(quoin_scene scene, std::size_t type, const quoin_orientations* orientations) {
-  return change_type(scene, type, [&](VoxelProperties& changed) -> Status {
-    changed.orientations = {};
-    if (orientations == nullptr) return {};
-    auto given = orientations_of(orientations);
-    if (!given) return given.error();
-    changed.orientations = std::move(*given);
-    return {};
-  });
+  return set_member(scene, type, &VoxelProperties::orientations, orientations, orientations_of);
 }
 
 quoin_status quoin_orientation_turn(std::int32_t orientation, std::int32_t axis, std::int32_t quarter_turns,
@@ -585,14 +585,7 @@ quoin_status quoin_type_placed_state(quoin_scene scene, std::size_t type, const 
 }
 
 quoin_status quoin_type_set_shapes(quoin_scene scene, std::size_t type, const quoin_shapes* shapes) {
-  return change_type(scene, type, [&](VoxelProperties& changed) -> Status {
-    changed.shapes = {};
-    if (shapes == nullptr) return {};
-    auto given = shapes_of(shapes);
-    if (!given) return given.error();
-    changed.shapes = std::move(*given);
-    return {};
-  });
+  return set_member(scene, type, &VoxelProperties::shapes, shapes, shapes_of);
 }
 
 quoin_status quoin_scene_textures(quoin_scene scene, std::size_t max_layers, quoin_textures* out) {
