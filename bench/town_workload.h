@@ -13,6 +13,8 @@
 #include <quoin/core/assert.h>
 #include <quoin/scene/scene.h>
 
+#include "grid/shapes/shape_types_for_tests.h"
+
 namespace quoin::workloads {
 
 inline constexpr int kTownEdge = 9 * kChunkEdge;
@@ -33,19 +35,11 @@ struct TownTypes {
     street = add({.name = "street", .colour = {150, 145, 135}});
     wall = add({.name = "wall", .colour = {205, 195, 175}});
     roof = add({.name = "roof", .colour = {150, 70, 55}});
-    slab = add({.name = "slab", .colour = {170, 170, 175}}, VoxelShape::box({0, 0, 0}, {16, 8, 16}));
+    slab = add({.name = "slab", .colour = {170, 170, 175}}, shapes_for_tests::slab());
     VoxelProperties of_stairs{.name = "stairs", .colour = {165, 80, 60}, .state_bits = 3};
     of_stairs.orientations = StateOrientations::about_y_and_upside_down();
-    stairs = add(of_stairs, VoxelShape::boxes({{{0, 0, 0}, {16, 8, 16}}, {{8, 8, 0}, {16, 16, 16}}}));
-    ShapeRules arms{.parts = {{.shape = VoxelShape::box({6, 0, 6}, {10, 16, 10})}},
-                    .neighbours = ShapeNeighbours::Connected};
-    for (int turns = 0; turns < 4; ++turns) {
-      const AxisOrientation turn = AxisOrientation::quarter_turns(1, turns);
-      arms.parts.push_back({.shape = VoxelShape::boxes({{{10, 12, 7}, {16, 15, 9}}, {{10, 6, 7}, {16, 9, 9}}}),
-                            .orientation = turn,
-                            .when = {{.connected = {turn.apply(Direction::PosX)}}}});
-    }
-    fence = add({.name = "fence", .colour = {125, 90, 55}}, *VoxelShapes::from_rules(std::move(arms)));
+    stairs = add(of_stairs, shapes_for_tests::straight_stairs());
+    fence = add({.name = "fence", .colour = {125, 90, 55}}, shapes_for_tests::fence(2));
     torch = add({.name = "torch", .colour = {250, 215, 120}}, VoxelShape::box({7, 0, 7}, {9, 10, 9}));
     flower = add({.name = "flower", .colour = {210, 60, 130}}, VoxelShape::crossed_plates(14));
     VoxelProperties of_door{.name = "door", .colour = {100, 70, 40}, .state_bits = 2};

@@ -237,41 +237,32 @@ std::size_t expect_fresh(const ShownSurfaces& shown, const ShapedWorld& world, i
   return faces;
 }
 
-TEST(LiveShapes, MatchFreshMeshesAfterEdits) {
-  for (const int edge : {16, 64}) {
-    ShapedWorld world(static_cast<unsigned>(edge));
-    LiveMeshOptions options;
-    options.region_edge = edge;
-    LiveMeshes meshes(options);
-    ShownSurfaces shown;
-    for (int round = 0; round < 40 && !testing::Test::HasFailure(); ++round) {
-      SCOPED_TRACE("edge " + std::to_string(edge) + ", round " + std::to_string(round));
-      meshes.finish(world.scene, {});
-      shown.apply(meshes.take());
-      EXPECT_GT(expect_fresh(shown, world, edge, nullptr), 300U);
-      for (int i = world.below(3); i >= 0; --i) world.edit_voxels();
-      if (round % 4 == 3) world.edit_types();
-    }
-  }
-}
-
-TEST(LiveShapes, MatchFreshLightAfterEdits) {
-  ShapedWorld world(3);
-  SceneLight light;
+// Compares live meshes with fresh ones between random edits. `light`: null for meshes without light.
+void expect_fresh_after_edits(unsigned seed, int edge, SceneLight* light) {
+  ShapedWorld world(seed);
   LiveMeshOptions options;
-  options.region_edge = kChunkEdge;
+  options.region_edge = edge;
   LiveMeshes meshes(options);
-  meshes.use_light(&light);
+  if (light != nullptr) meshes.use_light(light);
   ShownSurfaces shown;
   for (int round = 0; round < 40 && !testing::Test::HasFailure(); ++round) {
-    SCOPED_TRACE("round " + std::to_string(round));
-    light.update(world.scene);
+    SCOPED_TRACE("edge " + std::to_string(edge) + ", round " + std::to_string(round));
+    if (light != nullptr) light->update(world.scene);
     meshes.finish(world.scene, {});
     shown.apply(meshes.take());
-    EXPECT_GT(expect_fresh(shown, world, kChunkEdge, &light), 300U);
+    EXPECT_GT(expect_fresh(shown, world, edge, light), 300U);
     for (int i = world.below(3); i >= 0; --i) world.edit_voxels();
     if (round % 4 == 3) world.edit_types();
   }
+}
+
+TEST(LiveShapes, MatchFreshMeshesAfterEdits) {
+  for (const int edge : {16, 64}) expect_fresh_after_edits(static_cast<unsigned>(edge), edge, nullptr);
+}
+
+TEST(LiveShapes, MatchFreshLightAfterEdits) {
+  SceneLight light;
+  expect_fresh_after_edits(3, kChunkEdge, &light);
 }
 
 TEST(LiveShapes, FollowLiveLight) {
