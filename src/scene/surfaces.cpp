@@ -264,15 +264,22 @@ bool meet_side(const FaceTexels& side, const Ray& ray, IVec3 cell, MetFace& met,
 
 }  // namespace
 
-bool meet_cell(const Surfaces& surfaces, GridReader& voxels, std::int32_t placed, VoxelType type,
-               const Ray& ray_in_grid, const CellSpan& span, double max_t, std::vector<MetFace>& out) {
+bool meet_cell(const Surfaces& surfaces, GridReader& voxels, const ShapeIndex* shapes, std::int32_t placed,
+               VoxelType type, const Ray& ray_in_grid, const CellSpan& span, double max_t, std::vector<MetFace>& out) {
   const TypeFaces* const faces = surfaces.faces(type);
   QUOIN_ASSERT(faces != nullptr && faces->content == CellContent::Faces, "a type with faces");
-  const auto is_hidden_by = [&](VoxelType other) { return other == type || surfaces.is_opaque(other); };
+  // `outward`: from the cell to `front`.
+  const auto is_hidden = [&](IVec3 front, Direction outward) {
+    const VoxelType other = voxels.get(front);
+    if (other == type) return true;
+    if (!surfaces.is_opaque(other)) return false;
+    const ShapesAtVoxel here = shapes == nullptr ? ShapesAtVoxel() : shapes->at(front);
+    return !here.has_own() || here[0].model->covers_side[static_cast<std::size_t>(opposite(outward))];
+  };
   MetFace met;
   met.placed = placed;
   met.type = type;
-  if (!span.starts_inside && span.t_enter <= max_t && !is_hidden_by(voxels.get(span.first + normal_of(span.face)))) {
+  if (!span.starts_inside && span.t_enter <= max_t && !is_hidden(span.first + normal_of(span.face), span.face)) {
     met.voxel = span.first;
     met.face = span.face;
     met.side = static_cast<std::uint16_t>(span.face);
@@ -281,7 +288,7 @@ bool meet_cell(const Surfaces& surfaces, GridReader& voxels, std::int32_t placed
   }
   const FaceTexels& far_side = faces->sides[static_cast<std::size_t>(span.exit_face)];
   if (far_side.alpha == FaceAlpha::Translucent || !(span.t_exit <= max_t)) return true;
-  if (is_hidden_by(voxels.get(span.behind))) return true;
+  if (is_hidden(span.behind, span.exit_face)) return true;
   met.voxel = span.behind;
   met.face = opposite(span.exit_face);
   met.side = static_cast<std::uint16_t>(span.exit_face);

@@ -23,6 +23,8 @@
 
 namespace quoin {
 
+class ShapeIndex;
+
 /// The shading properties of a voxel type, in linear light.
 struct Surface {
   Vec3 colour{0.0F};
@@ -177,7 +179,8 @@ class Surfaces {
   [[nodiscard]] bool has_textured_cells() const { return has_textured_glass_ || has_cells_of_faces_; }
   /// Returns true if any type has cells of faces.
   [[nodiscard]] bool has_cells_of_faces() const { return has_cells_of_faces_; }
-  /// Returns true if a type hides the faces of its neighbours. Unregistered ids do.
+  /// Returns true if a type hides the faces of its neighbours: cubes all of them, shapes those that they cover.
+  /// Unregistered ids do.
   [[nodiscard]] bool is_opaque(VoxelType type) const {
     return type + std::size_t{1} >= surfaces_.size() || is_opaque_[type] != 0;
   }
@@ -239,8 +242,9 @@ struct MetFace {
 /// Finds the content of a cell that a ray meets, for types with CellContent::Faces. All rays that see such a cell call
 /// this: those of the camera, shadow and occlusion rays, and paths.
 ///
-/// A face is there if the mesher draws it: its neighbour is neither opaque nor of the same type. The ray meets the
-/// outer side of its entry face, unless it starts inside, and the inner side of its exit face. Opaque and cutout faces
+/// A face is there if the mesher draws it: its neighbour is neither opaque nor of the same type, and no opaque shape
+/// there covers the whole side. The ray meets the outer side of its entry face, unless it starts inside, and the inner
+/// side of its exit face. Opaque and cutout faces
 /// have two sides; translucent ones are seen from outside only. Texels are those of level 0, so that all rays agree.
 ///
 /// To join: other content than faces of cubes, such as shapes, is found here too. It appends its texels in order of t,
@@ -248,8 +252,9 @@ struct MetFace {
 /// render/light/glass_bodies.cpp limits it to one voxel for content inside of voxels.
 ///
 /// Appends to `out`, nearest first, texels with some cover up to and including `max_t`. Returns false if the last one
-/// ends the ray. `voxels`: reads the grid of `ray_in_grid`. `placed`: its index, for MetFace.
-bool meet_cell(const Surfaces& surfaces, GridReader& voxels, std::int32_t placed, VoxelType type,
-               const Ray& ray_in_grid, const CellSpan& span, double max_t, std::vector<MetFace>& out);
+/// ends the ray. `voxels`: reads the grid of `ray_in_grid`. `shapes`: of this grid, or null if it has none. `placed`:
+/// its index, for MetFace.
+bool meet_cell(const Surfaces& surfaces, GridReader& voxels, const ShapeIndex* shapes, std::int32_t placed,
+               VoxelType type, const Ray& ray_in_grid, const CellSpan& span, double max_t, std::vector<MetFace>& out);
 
 }  // namespace quoin

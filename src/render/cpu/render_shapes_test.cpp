@@ -1,15 +1,21 @@
 // Shapes of voxel types in ray-traced images.
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
+#include <set>
 #include <utility>
 
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <gtest/gtest.h>
 
+#include <quoin/mesh/blocky.h>
+
 #include "grid/shapes/shape_types_for_tests.h"
 #include "render/cpu/render_test_support.h"
+#include "render/light/glass_bodies.h"
 
 namespace quoin {
 namespace {
@@ -168,6 +174,69 @@ TEST(RenderShapes, RaysAndShadowsPassCutoutTexels) {
     for (int x = 0; x < 32; ++x) wrong += (pixel_at(below, x, y)[0] < 100) == (x >= 16) ? 0 : 1;
   }
   EXPECT_EQ(wrong, 0);
+}
+
+// Leaves next to shapes: a shape hides a face only if it covers the whole side, as in the mesh.
+TEST(RenderShapes, ShapesHideTheFacesOfCellsThatTheyCover) {
+  Scene scene;
+  const ShapeTypes types(scene.types);
+  VoxelProperties leaves{.name = "leaves", .visibility = Visibility::Transparent};
+  leaves.faces = VoxelFaces(VoxelFace{.texture = quarters(), .alpha = FaceAlpha::Cutout});
+  const VoxelType leaf = *scene.types.add(leaves);
+  const std::array<VoxelType, 8> near = {kAir,         types.stone, types.slab,  types.stairs,
+                                         types.stairs, types.water, types.fence, types.door};
+  std::mt19937 random(17);
+  Grid grid;
+  for (int i = 0; i < 12 * 12 * 12; ++i) {
+    const IVec3 at = IVec3{i % 12, i / 12 % 12, i / 144} + 4;
+    const bool is_leaf = random() % 3 == 0;
+    const VoxelType type = is_leaf ? leaf : near.at(random() % near.size());
+    grid.set(at, type, {.state = static_cast<std::uint32_t>(random() % (type == types.stairs ? 8 : 1))});
+  }
+  std::set<std::array<int, 4>> drawn;
+  QuadBuffer quads;
+  ShapeFaceBuffer faces;
+  BlockyMesher().mesh(grid.neighbourhood(IVec3(0)), scene.types, {}, quads, faces);
+  for (const Quad& quad : quads) {
+    if (quad.type() != leaf) continue;
+    const FaceFrame& frame = frame_of(quad.direction());
+    for (int i = 0; i < quad.size_u() * quad.size_v(); ++i) {
+      IVec3 at = quad.voxel();
+      at[frame.u] += i % quad.size_u();
+      at[frame.v] += i / quad.size_u();
+      drawn.insert({at.x, at.y, at.z, static_cast<int>(quad.direction())});
+    }
+  }
+  const Grid voxels = grid.snapshot();
+  place(scene, std::move(grid));
+  const SceneTracer tracer(scene);
+  const Surfaces surfaces(scene.types);
+  int next_to_shapes = 0;
+  int covered = 0;
+  SeenThrough seen;
+  voxels.for_each([&](IVec3 at, VoxelType type) {
+    if (type != leaf) return;
+    for (const Direction direction : kDirections) {
+      const IVec3 front = at + normal_of(direction);
+      // Into the voxel and out of it, from half a voxel away.
+      const DVec3 outside = DVec3(at) + 0.47 + 0.8 * DVec3(normal_of(direction));
+      const DVec3 inside = DVec3(at) + 0.47;
+      const SceneView view(tracer, DVec3(0.0));
+      const bool is_drawn = drawn.contains({at.x, at.y, at.z, static_cast<int>(direction)});
+      find_transparent(view, surfaces, {outside, -DVec3(normal_of(direction))}, 0.8, seen);
+      const auto is_outer = [&](const MetFace& met) { return met.voxel == at && met.type == leaf; };
+      EXPECT_EQ(std::ranges::any_of(seen.faces, is_outer), is_drawn) << at.x << " " << at.y << " " << at.z;
+      find_transparent(view, surfaces, {inside, DVec3(normal_of(direction))}, 0.8, seen);
+      const auto is_inner = [&](const MetFace& met) { return met.voxel == front && met.type == leaf; };
+      EXPECT_EQ(std::ranges::any_of(seen.faces, is_inner), is_drawn) << at.x << " " << at.y << " " << at.z;
+      const VoxelType other = voxels.get(front);
+      if (!scene.types.is_shaped(other) || other == types.water) continue;
+      ++next_to_shapes;
+      covered += is_drawn ? 0 : 1;
+    }
+  });
+  EXPECT_GT(covered, 100);
+  EXPECT_GT(next_to_shapes, 3 * covered);
 }
 
 TEST(RenderShapes, PanesTintWhatIsBehind) {

@@ -108,6 +108,7 @@ class BodiesOfGrid {
   __attribute__((noinline)) bool add_textured_voxels() {
     begin();
     GridReader voxels_of(*placed_.voxels);
+    const ShapeIndex* const shapes = placed_.shapes == nullptr ? nullptr : &placed_.shapes->index;
     VoxelType type = kAir;
     CellContent content = CellContent::Glass;
     float log_clarity = 0.0F;
@@ -129,7 +130,7 @@ class BodiesOfGrid {
     };
     trace::visit_blocks(*placed_.transparent, ray_, max_t_, enter, largest, [&](const trace::WalkSpan& span) {
       if (content == CellContent::Faces) {
-        is_open = meet_cell(surfaces_, voxels_of, index_, type, ray_, cell_span(span), max_t_, faces_);
+        is_open = meet_cell(surfaces_, voxels_of, shapes, index_, type, ray_, cell_span(span), max_t_, faces_);
         return is_open;
       }
       return add_span(span, type, log_clarity, content == CellContent::TexturedGlass ? &texel : nullptr);
