@@ -467,8 +467,34 @@ void add_shapes(ShapeRay cell, Body next, float exit_t, float ray_t, float voxel
 // Set by `add_faces`, cleared by callers: true if a ray met a face that hides everything behind it.
 bool met_closed_face;
 
-// Returns true if a voxel hides the faces of a neighbour of that type.
-bool hides_faces(GridTrees trees, ivec3 voxel, uint type) {
+// Finds the sides that a voxel's own shape hides wholly, a bit per direction. Returns false if it has none.
+bool find_own_shape(int grid, ivec3 voxel, out uint hidden) {
+  hidden = 0;
+  uvec4 chunk;
+  if (!find_chunk(shape_trees(grid).touched, voxel, chunk)) return false;
+  uint index = index_in(voxel, 2);
+  if (!has_child(chunk, index)) return false;
+  uvec4 brick = Nodes(chunk.zw).at[child_of(chunk, index)];
+  index = index_in(voxel, 1);
+  if (!has_child(brick, index)) return false;
+  uint child = child_of(brick, index);
+  uvec4 word = uvec4(Words(brick.zw).at[child], 1, 0);
+  index = index_in(voxel, 0);
+  if (!has_child(word, index)) return false;
+  uint words = bitCount(brick.x) + bitCount(brick.y);
+  uint from = Numbers(address_after(brick.zw, 8 * words)).at[child];
+  Numbers list = Numbers(address_after(record_of(chunk), 4 * from));
+  uint first = list.at[child_of(word, index)];
+  uint shape = list.at[first];
+  if ((shape >> kShapePlace & 31) != 13) return false;  // of another voxel; the own one would be the first
+  if ((shape & kShapeIsOpaque) != 0) hidden = shape_numbers(list.at[first + 1] + 1).y;
+  return true;
+}
+
+// Returns true if a voxel hides the face of a neighbour of that type. `side`: the face, towards the voxel.
+bool hides_face(GridTrees trees, int grid, ivec3 voxel, uint type, uint side) {
+  uint hidden;
+  if (kHasShapes && find_own_shape(grid, voxel, hidden)) return (hidden >> (side ^ 1) & 1) != 0;
   uvec4 chunk;
   bool is_known = find_chunk(trees.opaque, voxel, chunk);
   if (!is_known) is_known = find_chunk(trees.transparent, voxel, chunk);
@@ -481,7 +507,8 @@ bool hides_faces(GridTrees trees, ivec3 voxel, uint type) {
 // left it. `entry`: the position in the voxel where the ray enters. Returns false if a face ends the ray.
 bool add_faces(Body cell, vec3 entry, float enter_t, float ray_t, float room, float from_t, inout BodyList list,
                inout vec3 passed) {
-  GridTrees trees = Grids(frame().grids).at[placed_at(cell.voxel.w).ref_base.w];
+  int grid = placed_at(cell.voxel.w).ref_base.w;
+  GridTrees trees = Grids(frame().grids).at[grid];
   bool is_open = true;
   for (int i = 0; i < 2 && is_open; ++i) {
     bool is_outer = i == 0;
@@ -490,7 +517,7 @@ bool add_faces(Body cell, vec3 entry, float enter_t, float ray_t, float room, fl
     ivec3 front = cell.voxel.xyz;
     front[axis_of(side)] += int(sign_of(side));
     bool is_there = t <= room && !(is_outer && (cell.what.z & kStartsInside) != 0);
-    if (is_there) is_there = !hides_faces(trees, front, cell.what.x);
+    if (is_there) is_there = !hides_face(trees, grid, front, cell.what.x, side);
     if (!is_there) continue;
     uvec4 what = TexturedFaces(frame().textured_faces).at[face_of_cell(cell.what.x, side)].what;
     uint alpha = what.z >> 12 & 3;

@@ -8,7 +8,8 @@
 // A model in the table of vectors:
 //
 //   0      number of boxes; index of the first side; number of the first free side (fluids), and how many there are
-//   1      index of the corners of free sides, four vectors each
+//   1      index of the corners of free sides, four vectors each; the sides of the voxel that are covered wholly, a bit
+//          per direction
 //   then   boxes, kBoxVectors each: lower corner, w: the place of its turn in the model, or 0; upper corner; the
 //          numbers of its sides, 16 bits each, kNoSide for those that are not drawn
 //   then   turns, four vectors each: origin, and the rows of the matrix

@@ -318,7 +318,7 @@ Result<std::uint32_t> DeviceShapes::add(const ShapeModel& model, const VoxelProp
   }
   std::vector<Vec4> head;
   add_numbers(static_cast<std::uint32_t>(model.boxes.size()), sides, plain, model.free_faces, head);
-  add_numbers(corners, 0, 0, 0, head);
+  add_numbers(corners, model.covered_sides, 0, 0, head);
   std::ranges::copy(head, vectors_.begin() + first);
   return first;
 }

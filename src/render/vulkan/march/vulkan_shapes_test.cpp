@@ -1,5 +1,6 @@
 // Marched images show the shapes of voxel types as the CPU renderer does.
 
+#include <array>
 #include <string>
 #include <utility>
 
@@ -211,6 +212,28 @@ TEST_F(VulkanShapes, CutoutAndTranslucentCubesMatchCpu) {
   RenderOptions unlit = options;
   unlit.light.shading = Shading::Unlit;
   compare(scene, towards({-2.4, 1.3, -2.6}, {4, 1, 3}, 1.2), unlit, "cells_inside");
+}
+
+// A shape hides the faces of leaves next to it only where it covers the whole side.
+TEST_F(VulkanShapes, CellsNextToShapesMatchCpu) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
+  Scene scene;
+  const ShapeTypes types(scene.types);
+  VoxelProperties of_leaves{.name = "leaves", .visibility = Visibility::Transparent};
+  of_leaves.faces = VoxelFaces(VoxelFace{.texture = noise_with_alpha(1, 0), .alpha = FaceAlpha::Cutout});
+  const VoxelType leaves = *scene.types.add(of_leaves);
+  SceneGrid garden;
+  for (int i = 0; i < 6 * 3 * 6; ++i) {
+    const IVec3 at{i % 6, i / 6 % 3, i / 18};
+    const std::array<VoxelType, 5> some = {leaves, leaves, types.stairs, types.slab, types.door};
+    const VoxelType type = some[static_cast<std::size_t>((at.x + 2 * at.y + 3 * at.z + at.x * at.z) % 5)];
+    garden.grid.set(at, type, {.state = static_cast<std::uint32_t>(type == types.stairs ? i % 8 : 0)});
+  }
+  scene.add_instance({"", scene.add_grid(std::move(garden))});
+  RenderOptions unlit = sized(160, 120);
+  unlit.light.shading = Shading::Unlit;
+  compare(scene, towards({9, 7, 11}, {3, 1, 3}), unlit, "leaves");
+  compare(scene, towards({-4, 0.4, -6}, {3, 1.5, 3}), unlit, "leaves_below");
 }
 
 }  // namespace
