@@ -37,7 +37,7 @@ namespace [[gnu::visibility("default")]] quoin {
 ///          type with the greatest weight. Other data is not kept.
 /// Again:   `types` is for the voxels of `grid`. To halve the result, use `types_of_halved(types)`.
 /// Threads: the result is the same at any thread count.
-/// Cost:    1.3 to 3 ms per chunk of the result, for caves with several types; 5 to 7 ms more for an ocean or a town of
+/// Cost:    1.3 to 3 ms per chunk of the result, for caves with several types; 4 to 6 ms more for an ocean or a town of
 ///          shapes.
 /// Errors:  Cancelled.
 [[nodiscard]] Result<Grid> downsample(const Grid& grid, const VoxelRegistry& types, Threads threads = {},

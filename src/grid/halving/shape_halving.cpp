@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -180,10 +181,20 @@ class ShapeCounter {
       const KnownType& known = known_type(row[0]);
       const bool is_known = known.rule == KnownType::Rule::NoShape || known.rule == KnownType::Rule::OneShape ||
                             (known.rule == KnownType::Rule::Fluid && std::ranges::equal(row, planes.row(y + 1, z)));
+      std::optional<std::uint32_t> kind;
       if (is_known) {
-        std::fill_n(kinds, kChunkEdge, known.kind);
-        shaped = known.kind == 0 ? 0 : ~std::uint64_t{0};
-        return known.kind;
+        kind = known.kind;
+      } else if (const auto around = planes.rows_around(y, z)) {
+        if (around != known_around_) {
+          kind_between_ = kind_of(planes, {0, y, z}, row[0]);
+          known_around_ = around;
+        }
+        kind = kind_between_;
+      }
+      if (kind) {
+        std::fill_n(kinds, kChunkEdge, *kind);
+        shaped = *kind == 0 ? 0 : ~std::uint64_t{0};
+        return *kind;
       }
     }
     shaped = 0;
@@ -359,9 +370,11 @@ class ShapeCounter {
   std::vector<KnownType> known_types_;
   std::array<KnownModel, 256> known_models_{};
   std::map<std::pair<VoxelType, const ShapeModel*>, std::uint32_t> kind_numbers_;
-  BlockVector<ShapeKind> kinds_;            // 0: no shape
-  BlockVector<std::uint32_t> plane_kinds_;  // of two planes
-  BlockVector<std::uint32_t> cells_;        // kOneKind | kind, or 1 + the first entry; 0: no shapes
+  std::optional<std::array<std::uint64_t, 9>> known_around_;  // the last one of NearPlanes::rows_around
+  std::uint32_t kind_between_ = 0;                            // of the row between those
+  BlockVector<ShapeKind> kinds_;                              // 0: no shape
+  BlockVector<std::uint32_t> plane_kinds_;                    // of two planes
+  BlockVector<std::uint32_t> cells_;                          // kOneKind | kind, or 1 + the first entry; 0: no shapes
   BlockVector<Entry> entries_;
   std::array<std::uint64_t, kChunkEdge> rows_{};  // [z], bit y: rows of cells with shapes
 };

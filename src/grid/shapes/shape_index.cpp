@@ -205,7 +205,10 @@ const ShapeModel* shape_at(const Grid& grid, const VoxelRegistry& types, IVec3 v
 }
 
 NearPlanes::NearPlanes(const Neighbourhood& chunks)
-    : chunks_(chunks), types_(std::size_t{4} * kPlane), changes_(std::size_t{4} * kRow) {
+    : chunks_(chunks),
+      types_(std::size_t{4} * kPlane),
+      changes_(std::size_t{4} * kRow),
+      is_other_at_end_(changes_.size()) {
   const bool has_data = std::ranges::any_of(
       chunks.chunks, [](const Chunk* chunk) { return chunk != nullptr && chunk->data_count() != 0; });
   if (has_data) states_.resize(types_.size());
@@ -227,6 +230,8 @@ void NearPlanes::read(int z) {
     row[kChunkEdge] = chunks_.get({kChunkEdge, y, z});
     std::uint64_t& changes = changes_[change_of(y, z)];
     changes = changes_in(row);
+    std::uint8_t& is_other_at_end = is_other_at_end_[change_of(y, z)];
+    is_other_at_end = row[kChunkEdge] != row[kChunkEdge - 1] ? 1 : 0;
     if (states_.empty()) continue;
     std::uint32_t* const states = &states_[place_of({0, y, z})];
     std::fill_n(states, kChunkEdge, 0U);
@@ -239,6 +244,7 @@ void NearPlanes::read(int z) {
       }
     }
     for (int x = 0; x < kChunkEdge; ++x) changes |= std::uint64_t{states[x] != states[x - 1]} << x;
+    is_other_at_end |= states[kChunkEdge] != states[kChunkEdge - 1] ? 1 : 0;
   }
 }
 
@@ -258,6 +264,17 @@ std::uint64_t NearPlanes::repeated(int y, int z) const {
   for (int i = 0; i < 9; ++i) changes |= changes_[change_of(y + i % 3 - 1, z + i / 3 - 1)];
   constexpr std::uint64_t kEnds = std::uint64_t{1} << 63 | 1U;  // their neighbours are not compared
   return ~(changes | changes << 1 | changes >> 1 | kEnds);
+}
+
+std::optional<std::array<std::uint64_t, 9>> NearPlanes::rows_around(int y, int z) const {
+  std::array<std::uint64_t, 9> rows;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const IVec3 at{0, y + static_cast<int>(i % 3) - 1, z + static_cast<int>(i / 3) - 1};
+    const std::size_t row = change_of(at.y, at.z);
+    if ((changes_[row] | is_other_at_end_[row]) != 0) return std::nullopt;
+    rows[i] = std::uint64_t{get(at)} << 32 | state(at);
+  }
+  return rows;
 }
 
 const ShapeModel* shape_at(const NearPlanes& planes, const VoxelRegistry& types, IVec3 local) {

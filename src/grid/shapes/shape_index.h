@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -46,6 +47,9 @@ class NearPlanes {
   // Returns the voxels of a row whose neighbourhoods of 3^3 types and states are equal to those of the voxel before, as
   // bits: they have the same shape. Requires: the planes z - 1 to z + 1 were read, 0 <= y, z < 64.
   [[nodiscard]] std::uint64_t repeated(int y, int z) const;
+  // Returns the type and state of each of the nine rows around a row, as words, if all voxels of each are equal from -1
+  // to 64: the row's voxels have the same shape. Requires: as `repeated`.
+  [[nodiscard]] std::optional<std::array<std::uint64_t, 9>> rows_around(int y, int z) const;
   [[nodiscard]] std::uint32_t state(IVec3 at) const { return states_.empty() ? 0 : states_[place_of(at)]; }
 
  private:
@@ -64,7 +68,8 @@ class NearPlanes {
   Neighbourhood chunks_;
   BlockVector<VoxelType> types_;
   BlockVector<std::uint64_t> changes_;  // by row: voxels whose type or state differs from that of the voxel before
-  BlockVector<std::uint32_t> states_;   // empty: all are 0
+  BlockVector<std::uint8_t> is_other_at_end_;  // by row: 1 if voxel 64 differs from voxel 63
+  BlockVector<std::uint32_t> states_;          // empty: all are 0
 };
 
 // As the functions of the public headers. Requires: the planes of the voxel and of its neighbours are read.
