@@ -59,13 +59,18 @@ std::span<const std::uint32_t> code_of(Pass pass) {
 Result<std::unique_ptr<Pipelines>> Pipelines::create(Device& device) {
   std::unique_ptr<Pipelines> made(new Pipelines(device));
   VkResult result = make_push_layout(device, VK_SHADER_STAGE_COMPUTE_BIT, sizeof(ShaderPush), made->layout_);
-  for (std::size_t i = 0; i < kPassCount && result == VK_SUCCESS; ++i) result = made->make(static_cast<Pass>(i), {});
+  for (const Pass pass : {Pass::Resolve, Pass::Swap}) {
+    if (result == VK_SUCCESS) result = made->make(pass, {});
+  }
   if (Status status = device.check(result, "compiling shaders"); !status) return status.error();
   return made;
 }
 
-Status Pipelines::add(const PassFeatures& features, bool has_glass) {
+Status Pipelines::add(const PassFeatures& features, bool has_glass, bool has_far) {
   VkResult result = make(Pass::Primary, features);
+  for (const Pass pass : {Pass::FarDepths, Pass::FarFaces}) {
+    if (result == VK_SUCCESS && has_far) result = make(pass, {});
+  }
   if (result == VK_SUCCESS && has_glass) result = make(Pass::Glass, features);
   if (result == VK_SUCCESS) result = make(has_glass ? Pass::LightWithGlass : Pass::Light, features);
   return device_->check(result, "compiling shaders");

@@ -54,11 +54,12 @@ struct PassFeatures {
 
 class Pipelines {
  public:
-  /// Makes the pipelines of all passes without features.
+  /// Makes the small pipelines of Resolve and Swap. `add` makes those that a scene needs: drivers take seconds for each.
   [[nodiscard]] static Result<std::unique_ptr<Pipelines>> create(Device& device);
   ~Pipelines();
-  /// Makes the missing pipelines of scenes with these features. `has_glass`: scenes with transparent bodies.
-  [[nodiscard]] Status add(const PassFeatures& features, bool has_glass);
+  /// Makes the missing pipelines of scenes with these features. `has_glass`: scenes with transparent bodies. `has_far`:
+  /// images with impostors.
+  [[nodiscard]] Status add(const PassFeatures& features, bool has_glass, bool has_far);
   Pipelines(const Pipelines&) = delete;
   Pipelines& operator=(const Pipelines&) = delete;
 

@@ -306,8 +306,9 @@ std::vector<ImagePass::Tile> ImagePass::tiles_of(const RenderOptions& options) c
 }
 
 Status ImagePass::begin(const Camera& camera, const RenderOptions& options) {
-  if (Status done = pipelines_->add(features_, placement_->has_transparent); !done) return done;
   if (Status done = put_frame(camera, options); !done) return done;
+  const bool has_far = std::ranges::any_of(far_, [](const FarTiles::Range& range) { return range.groups > 0; });
+  if (Status done = pipelines_->add(features_, placement_->has_transparent, has_far); !done) return done;
   return device_->run(kDoing, [&](VkCommandBuffer commands) {
     device_->api().vkCmdFillBuffer(commands, output_.handle(), 0, sizeof(ShaderCounters), 0);
   });
