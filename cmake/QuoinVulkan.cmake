@@ -34,11 +34,16 @@ function(quoin_add_shaders target folder)
   set(binary "${CMAKE_CURRENT_BINARY_DIR}/shaders")
   file(MAKE_DIRECTORY "${binary}")
   file(GLOB_RECURSE all CONFIGURE_DEPENDS "${folder}/*.comp" "${folder}/*.vert" "${folder}/*.frag")
+  # Optimising takes 5 to 10 s per shader, and drivers optimise again. The speed of checked builds is not measured.
+  set(optimised -O)
+  if(QUOIN_CHECKED)
+    set(optimised)
+  endif()
   foreach(shader ${all})
     cmake_path(GET shader FILENAME name)
     set(output "${binary}/${name}.inc")
     add_custom_command(OUTPUT "${output}"
-      COMMAND "${QUOIN_GLSLC}" --target-env=vulkan1.2 -O -mfmt=num -I "${folder}" -MD -MF "${output}.d" -o "${output}" "${shader}"
+      COMMAND "${QUOIN_GLSLC}" --target-env=vulkan1.2 ${optimised} -mfmt=num -I "${folder}" -MD -MF "${output}.d" -o "${output}" "${shader}"
       DEPENDS "${shader}" DEPFILE "${output}.d" VERBATIM COMMENT "Compiling shader ${name}")
     list(APPEND outputs "${output}")
   endforeach()
