@@ -136,6 +136,7 @@ GridHandle add_hills(Scene& scene, bool has_house) {
 }
 
 TEST_F(VulkanDetail, HalvedFieldsMatchCpu) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
   add_crowd(scene_, {add_hills(scene_, true), add_blobs(scene_, 32), add_hills(scene_, false)}, 3, 360.0);
   const Camera camera = towards({-300, 420, -500}, {400, 0, 400}, 0.7);
   std::set<int> halvings;
@@ -148,6 +149,7 @@ TEST_F(VulkanDetail, HalvedFieldsMatchCpu) {
 }
 
 TEST_F(VulkanDetail, EditsReachHalvedFields) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
   const GridHandle edited = add_hills(scene_, true);
   add_crowd(scene_, {edited, add_hills(scene_, false)}, 2, 360.0);
   const Camera camera = towards({-300, 420, -500}, {150, 0, 150}, 0.6);

@@ -105,6 +105,7 @@ TEST_F(VulkanPropagated, TransformedAndHalvedGridsMatchCpu) {
 }
 
 TEST_F(VulkanPropagated, FieldsMatchCpu) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
   Scene scene;
   const VoxelType lamp = add_type(scene, {255, 160, 60, 255}, Visibility::Opaque, 1.0F);
   SceneGrid made;

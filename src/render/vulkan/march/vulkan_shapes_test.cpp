@@ -153,6 +153,7 @@ TEST_F(VulkanShapes, EditedShapesMatchCpu) {
 }
 
 TEST_F(VulkanShapes, LightOfShapesMatchesCpu) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
   Garden garden(false);
   garden.scene.lamps.push_back({.position = {2.2, 3.1, 1.3}, .intensity = 60.0});
   const Camera camera = towards({5, 4, 7}, {0, 0, -1});

@@ -215,6 +215,7 @@ TEST_F(VulkanMeshDetail, SmoothMeshesStaySmooth) {
 // Fields are drawn from meshes of their halved samples, together with the halved blocks of the same grid; distant
 // fields from their full meshes.
 TEST_F(VulkanMeshDetail, HalvesFields) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
   const VoxelType stone = add_type(scene_, {200, 190, 170});
   const VoxelType brick = add_type(scene_, {190, 90, 70});
   SceneGrid hill;

@@ -170,6 +170,7 @@ TEST_F(VulkanMeshGlass, MatchesCpuExceptThroughGlass) {
 }
 
 TEST_F(VulkanMeshGlass, DrawsTooManyQuadsByChunk) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
   const Scene shown = panes({&Types::red, &Types::blue, &Types::glowing});
   MeshImageOptions options = mesh_options(without_shadows(sized(120, 120)));
   options.glass_by_rays = false;

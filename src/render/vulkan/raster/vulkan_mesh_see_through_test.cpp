@@ -165,6 +165,7 @@ TEST_F(VulkanMeshSeeThrough, RequiresVoxelsForGlass) {
 
 // Glass dims the edges of objects behind it, and has edges of its own.
 TEST_F(VulkanMeshSeeThrough, ShowsEdgesThroughGlass) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
   Scene scene;
   const VoxelType wall = add_type(scene, {230, 230, 230});
   const VoxelType glass = add_glass(scene, {120, 160, 220, 60}, 1.3F);
@@ -233,6 +234,7 @@ int different_walls(const std::vector<Image>& images, const std::vector<Image>& 
 // Compares marched walls, walls of blocks and walls of smooth bodies, in light without occlusion, since smooth surfaces
 // have their own.
 TEST_F(VulkanMeshSeeThrough, WallsMatchMarchedWalls) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
   const Scene scene = glass_yard();
   RenderOptions options = glass_yard_options(48, 36);
   options.light.occlusion_mode = OcclusionMode::Off;
@@ -266,6 +268,7 @@ TEST_F(VulkanMeshSeeThrough, WallsMatchMarchedWalls) {
 
 // Pixels at shores and silhouettes differ: a mesh interpolates the normals of its vertices.
 TEST_F(VulkanMeshSeeThrough, LakesAndBallsOfFieldsMatchCpu) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
   Scene scene;
   const vulkan_test::FieldTypes types = vulkan_test::add_field_types(scene);
   const VoxelType water = vulkan_test::add_water(scene);

@@ -103,6 +103,7 @@ TEST_F(VulkanMeshShadow, WallBaseHasNoFalseShadow) {
 }
 
 TEST_F(VulkanMeshShadow, GlassTintsTheSun) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
   Scene scene;
   const VoxelType floor = add_type(scene, {220, 220, 220});
   const VoxelType red = add_type(scene, {230, 40, 30, 120}, Visibility::Transparent);

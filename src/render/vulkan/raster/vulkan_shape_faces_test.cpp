@@ -143,6 +143,7 @@ TEST_F(VulkanShapeFaces, ShadowsOnShapesMatchCpu) {
 }
 
 TEST_F(VulkanShapeFaces, PropagatedLightOnShapesMatchesCpu) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
   const Hall hall(true);
   compare(hall.scene, Hall::inside(), propagated(200, 150), "propagated");
 }
@@ -216,6 +217,7 @@ TEST_F(VulkanShapeFaces, TranslucentFacesMatchCpu) {
 }
 
 TEST_F(VulkanShapeFaces, CutoutPlatesAreSeenFromBothSides) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
   Scene scene;
   const ShapeTypes types(scene.types);
   VoxelProperties plant = seen_through("plant", VoxelFace{.texture = holed_texture(16, 9), .alpha = FaceAlpha::Cutout});
