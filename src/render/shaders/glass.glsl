@@ -16,10 +16,6 @@ bool is_face(Body body) {
   return kHasCells && (body.what.x & kIsFace) != 0;
 }
 
-// Returns a type's entry in the table of texture numbers.
-uint texture_entry(uint type) {
-  return Numbers(frame().texture_numbers).at[min(type, frame().last_surface)];
-}
 // Returns the index of a textured type's face.
 uint face_of_cell(uint type, uint side) {
   return 6 * ((texture_entry(type) & kTextureNumber) - 1) + side;
@@ -589,7 +585,12 @@ void find_bodies_in(int i, bool is_of_field, bool is_of_shapes, GridRay ray, flo
       if (!add_faces(next, entry, enter_t, ray.t, room, from_t, list, passed)) break;
       continue;
     }
-    if ((how & kIsTexturedGlass) != 0) {
+    bool is_textured_glass = (how & kIsTexturedGlass) != 0;
+#ifdef HAS_CLOUDS
+    // A cloud has no surface to show a texture on.
+    if (is_textured_glass) is_textured_glass = !(surface_of(next.what.x).scattering > 0.0);
+#endif
+    if (is_textured_glass) {
       float exit_t = min(walk_t, room);
       next.lengths = vec4(ray.t + enter_t, ray.t + exit_t, (exit_t - enter_t) * voxels_a_t, enter_t);
       if (run.has_body && continues(run.body, next)) {

@@ -9,6 +9,7 @@ layout(constant_id = 0) const bool kHasGlass = true;
 #define KEEPS_BODIES
 #include "lit.glsl"
 #include "glass.glsl"
+#include "looks.glsl"
 #include "sky.glsl"
 #include "direct_light.glsl"
 #include "field_textures.glsl"
@@ -223,60 +224,6 @@ FieldPoint field_point(Point point, Placed placed) {
   return FieldPoint(voxel, point.inside.xyz * voxels, normal_of(point.what.y), spacing * spacing * voxels * voxels);
 }
 
-// Shows the look of a shape's side: its texture, in the mipmap level that fits the distance of samples, or its tint.
-void show_side(Point point, Placed placed, inout Surface surface) {
-  uint side = side_index(point.what.y);
-  uvec4 what = shape_numbers(side + 3);
-  if ((what.z & kSideHasLook) == 0) return;
-  vec3 texel = vec3(1.0);
-  if ((what.z & kSideHasTexels) != 0) {
-    float spacing = frame().down.w / placed.ref_inside.w;
-    if (has(kPerspective)) spacing *= point.inside.w;
-    int last = int(what.z & 15);
-    float square = spacing * spacing * uintBitsToFloat(what.w);
-    int log_size = last - mipmap_level(square, last);
-    texel = linear_from_srgb(unpackUnorm4x8(side_texel(side, point.inside.xyz, log_size)).xyz);
-  }
-  set_texel(texel, shape_vector(side + 4), surface);
-}
-
-// Returns the turn of a voxel by its state, as nine bits (pack_chunk). `turn`: of its type's voxels without data.
-uint turn_by_data(Tree opaque, ivec3 voxel, uint turn) {
-  uvec4 chunk;
-  if (!find_chunk(opaque, voxel, chunk)) return turn;
-  uvec2 types = Nodes(record_of(chunk)).at[0].xy;
-  uint count = Numbers(address_before(types, 4)).at[0];
-  Numbers list = Numbers(address_before(types, 4 + 4 * count));
-  ivec3 at = voxel & 63;
-  uint number = uint(at.x + 64 * (at.y + 64 * at.z));
-  uint low = 0;
-  for (uint high = count; low < high;) {
-    uint middle = (low + high) / 2;
-    if ((list.at[middle] & 0x3FFFF) < number) {
-      low = middle + 1;
-    } else {
-      high = middle;
-    }
-  }
-  return low < count && (list.at[low] & 0x3FFFF) == number ? list.at[low] >> 18 : turn;
-}
-
-// Turns a face of a voxel, and a position in it, to the unturned cube, if the voxel's state turns its type.
-void turn_by_state(Point point, Placed placed, inout uint face, inout vec3 inside) {
-  uint how = texture_entry(point.what.x);
-  if ((how & kIsTurnedByState) == 0) return;
-  uint turn = turn_by_data(opaque_tree(placed, 0), point.voxel.xyz, how >> kTextureTurn & kTurnBits);
-  vec3 off = inside - 0.5;
-  uint shown = face;
-  for (int i = 0; i < 3; ++i) {
-    uint from = turn >> (3 * i) & 7;
-    int axis = int(from & 3);
-    inside[i] = ((from & 4) != 0 ? -off[axis] : off[axis]) + 0.5;
-    if (axis == axis_of(face)) shown = uint(2 * i) + ((face & 1) ^ (from >> 2));
-  }
-  face = shown;
-}
-
 // Shows the texture of a voxel's face. Seen from inside, it lies around the ray's start. Glass around the ray's start
 // shows no face.
 void show_texture(Point point, Placed placed, inout Surface surface) {
@@ -297,7 +244,7 @@ void show_texture(Point point, Placed placed, inout Surface surface) {
   if (is_cell) {
     face = point.what.z >> 8 & 7;
   } else if (!is_mean) {
-    turn_by_state(point, placed, face, inside);
+    turn_by_state(point.what.x, point.voxel.xyz, placed, face, inside);
   }
   show_texture(point.what.x, face, inside, is_mean ? kMeanOfFace : spacing * spacing, surface);
 }
@@ -316,7 +263,9 @@ Surface surface_at(Point point, Placed placed) {
     if (kHasTextures) blended_point = field_point(point, placed);
     return blend_of_field(opaque_tree(placed, 1), point.voxel.xyz + ivec3(cell), at - cell, point.what.x);
   } else if (is_of_shape(point)) {
-    show_side(point, placed, surface);
+    float spacing = frame().down.w / placed.ref_inside.w;
+    if (has(kPerspective)) spacing *= point.inside.w;
+    show_side(point.what.y, point.inside.xyz, spacing * spacing, surface);
   } else if (kHasTextures && !is_of_field(point)) {
     show_texture(point, placed, surface);
   }

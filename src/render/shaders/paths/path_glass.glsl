@@ -27,13 +27,17 @@ void place_along(int instance, ViewRay ray, float t, out ivec4 voxel, out vec3 i
   inside = at - whole;
 }
 
+// Returns the face of a voxel body, or the lit side of a face of a cell.
+uint face_entered(Body body) {
+  return body.what.y & 7;
+}
 bool begins_in_shape(Body body) {
   return kHasShapes && (body.what.z & kBeginsInShape) != 0;
 }
 vec3 normal_entered(Body body) {
   if (begins_in_shape(body)) return side_normal(body.what.y);
   bool in_field = kHasFieldGlass && (body.what.z & kBeginsInField) != 0;
-  return in_field ? normal_of(body.what.y) : face_normal(body.what.y);
+  return in_field ? normal_of(body.what.y) : face_normal(face_entered(body));
 }
 
 // A path's next event in glass or air. Each outcome is handled in one place, since compilers inline functions.
@@ -74,13 +78,17 @@ uint hit_glass(Body body, ViewRay ray) {
   vec3 inside;
   place_along(body.voxel.w, ray, body.lengths.x, voxel, inside);
   inside += vec3(voxel.xyz - body.voxel.xyz);
-  if (!in_field && !begins_in_shape(body)) inside = put_on_face(inside, body.what.y);
+  if (!in_field && !begins_in_shape(body)) inside = put_on_face(inside, face_entered(body));
   vertex.is_ground = vertex.is_medium = false;
   put_on_surface(body.voxel, inside, normal_entered(body));
   vertex.colour = surface.colour;
-  vertex.roughness = 1.0;
-  vertex.metalness = 0.0;
+  vertex.roughness = is_face(body) ? surface.roughness : 1.0;
+  vertex.metalness = is_face(body) ? surface.metalness : 0.0;
   count_scene();
+  if (is_face(body) && !is(kIsNoted)) {
+    uint id = surface_id(voxel_of_grid(body.voxel), face_entered(body), false, body.voxel.w, type_of(body));
+    note_part(vertex.colour, id, false, vertex.normal, vertex.in_view);
+  }
   note_layers(body.lengths.x + behind, type_of(body));
   add_emitted(surface.emitted, -1, vec3(0.0), 0.0);
   return kScatters;
@@ -94,6 +102,22 @@ void scatter_in(Body body, float u, inout Glass glass) {
   glass.colour = surface.colour;
   glass.anisotropy = surface.anisotropy;
   glass.outcome = kInAir;
+}
+
+bool scatters(Body body) {
+  return surface_of(type_of(body)).scattering > 0.0;
+}
+
+// Meets a visible texel of a cell: its cover stops the path at random.
+void pass_face(Body face, inout float u, inout Glass glass) {
+  float cover = cover_of_face(face);
+  if (u < cover) {
+    glass.body = face;
+    glass.outcome = kOnGlass;
+    return;
+  }
+  u = min((u - cover) / (1.0 - cover), kAlmostOne);
+  path.throughput.xyz *= passed_by_body(face) / (1.0 - cover);
 }
 
 // Passes straight through a body: light between surfaces, and all paths in clouds. The glass's opaque share stops the
@@ -151,10 +175,22 @@ void enter_glass(Body body, float u, inout Glass glass) {
   }
 }
 
-// Follows a path within glass to the end of the body, or to an object inside it, at `opaque_t`.
+// Returns true if the path, or the camera, is in the first glass body on its ray.
+bool is_within(Body body) {
+  return is_begun(body) && (path.more.x == 0 || type_of(body) == path.more.x);
+}
+// Returns the distance where the path leaves the first body; -1 if it is not within that. Before, it meets faces of
+// cells: those of other grids, and those at the end of the glass.
+float end_within(Body body, Body face) {
+  if (!is_within(body)) return -1.0;
+  bool is_closed = (face.what.z & kIsClosed) != 0;
+  return body.lengths.y + (is_closed ? frame().lift * placed_at(int(body.what.w >> 3)).ref_inside.w : 0.0);
+}
+
+// Follows a path within glass to the end of the body, or to an object inside it, at `opaque_t`. The tint of the glass
+// is already part of the throughput.
 void leave_glass(Body body, bool has_next, Body next, float opaque_t, float u, inout Glass glass) {
   Surface surface = surface_of(type_of(body));
-  path.throughput.xyz *= tint_of(surface, body.lengths.z);
   int instance = int(body.what.w >> 3);
   Placed placed = placed_at(instance);
   bool touches = has_next && reaches(body, next.lengths.x);
@@ -185,8 +221,7 @@ void leave_glass(Body body, bool has_next, Body next, float opaque_t, float u, i
 // Handles the first glass body on a ray (clouds are skipped), and the body after it. `u`: a random number between 0 and
 // 1, not used by clouds.
 void look_into(bool has_body, Body body, bool has_next, Body next, float opaque_t, float u, inout Glass glass) {
-  bool is_within = has_body && is_begun(body) && (path.more.x == 0 || type_of(body) == path.more.x);
-  if (is_within) {  // or the camera is inside
+  if (has_body && is_within(body)) {
     path.more.x = type_of(body);
     leave_glass(body, has_next, next, opaque_t, u, glass);
     return;

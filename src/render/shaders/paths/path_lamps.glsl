@@ -81,6 +81,18 @@ float lamp_density(PathLamp lamp, LampSeen seen, vec3 direction, float distance)
   return cosine > 0.0 ? distance * distance / (cosine * lamp.u.w * lamp.v.w) : 0.0;
 }
 
+// Returns the radiance at a point of a lamp with a texture. `from_corner`: in view.
+vec3 radiance_at(PathLamp lamp, vec3 from_corner) {
+  uint face = lamp.texels.w >> 16;
+  vec2 at = vec2(dot(from_corner, lamp.u.xyz), dot(from_corner, lamp.v.xyz));
+  at = fract(clamp(at, vec2(0.0), vec2(lamp.u.w, lamp.v.w)) / lamp.light_of_texel.w);
+  vec3 inside = vec3(0.0);
+  inside[kFaceU[face]] = at.x;
+  inside[kFaceV[face]] = at.y;
+  uint texel = texel_at(lamp.texels, turned_cube(inside, lamp.texels.w), lamp.texels.z & 15);
+  return linear_from_srgb(unpackUnorm4x8(texel).xyz) * lamp.light_of_texel.xyz;
+}
+
 LampSample sample_of_lamp(PathLamp lamp, vec3 point, vec2 u) {
   LampSample found = LampSample(vec3(0.0), 0.0, vec3(0.0), 0.0);
   float reach = lamp.corner.w;
@@ -103,7 +115,9 @@ LampSample sample_of_lamp(PathLamp lamp, vec3 point, vec2 u) {
   found.direction = way / found.distance;
   if (reach <= 0.0) {
     found.density = lamp_density(lamp, seen, found.direction, found.distance);
-    if (found.density > 0.0) found.radiance = lamp.radiance.xyz / found.density;
+    vec3 radiance = lamp.radiance.xyz;
+    if (kHasTextures && lamp.texels.z != 0) radiance = radiance_at(lamp, way - seen.to_corner);
+    if (found.density > 0.0) found.radiance = radiance / found.density;
     return found;
   }
   if (found.distance >= reach) return found;

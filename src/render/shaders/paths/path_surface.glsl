@@ -23,6 +23,8 @@ Surface surface_of(uint type) {
   return Surface(colour.xyz, colour.w, emitted.xyz, passed.xyz, emitted.w, passed.w, rest.x, rest.y, rest.z);
 }
 
+#include "textures.glsl"
+
 // As in lit.glsl.
 Surface white_surface() {
   return Surface(vec3(1.0), 0.0, vec3(0.0), vec3(0.0), 1.0, 1.0, 0.0, 0.0, 0.0);

@@ -7,12 +7,16 @@
 #include "instances.glsl"
 #include "paths/path_math.glsl"
 #include "paths/path_surface.glsl"
+#include "looks.glsl"
 #define KEEPS_BODIES
 layout(constant_id = 0) const bool kHasGlass = true;
 #include "glass.glsl"
 #include "sky.glsl"
 #include "paths/path_sky.glsl"
 #include "paths/path_lamps.glsl"
+#include "field_textures.glsl"
+#define SHOWS_FIELD_TEXTURES
+FieldPoint blended_point;
 #include "field_blend.glsl"
 
 // Steps per dispatch: one with glass, where paths with several steps would diverge (docs/decisions/archive/105).
@@ -393,26 +397,28 @@ void count_scene() {
   if (is(kIsFirst)) add_sum(kSumBackground, vec4(0.0, 0.0, 0.0, 1.0));
 }
 
-// Returns the surface of a shape's side: that of its type, with the colour of the texel of level 0.
-Surface surface_of_side(Hit hit) {
-  Surface surface = surface_of(hit.type);
-  uint flags = side_flags(hit.side);
-  if ((flags & kSideHasLook) == 0) return surface;
-  vec4 tint = shape_vector(side_index(hit.side) + 4);
-  surface.colour = tint.xyz;
-  if ((flags & kSideHasTexels) != 0) {
-    surface.colour *= linear_from_srgb(unpackUnorm4x8(side_texel(hit.side, hit.inside)).xyz);
+Surface surface_met(Hit hit) {
+  if (!hit.in_field) {
+    Surface surface = surface_of(hit.type);
+    if (kHasShapes && hit.in_shape) show_side(hit.side, hit.inside, 0.0, surface);
+    return surface;
   }
-  surface.emitted = surface.colour * tint.w;
-  return surface;
+  if (hit.starts_inside) return surface_of_material(hit.type);
+  Placed placed = placed_at(hit.voxel.w);
+  if (kHasTextures) {
+    ivec3 voxel = (hit.voxel.xyz + placed.origin.xyz) << placed.origin.w;
+    blended_point = FieldPoint(voxel, hit.inside * placed.ref_view.w, hit.normal, 0.0);
+  }
+  Tree field = opaque_tree(placed, 1);
+  return blend_of_field(field, hit.voxel.xyz, hit.inside, hit.type);
 }
 
-Surface surface_met(Hit hit) {
-  if (kHasShapes && hit.in_shape) return surface_of_side(hit);
-  if (!hit.in_field) return surface_of(hit.type);
-  if (hit.starts_inside) return surface_of_material(hit.type);
-  Tree field = opaque_tree(placed_at(hit.voxel.w), 1);
-  return blend_of_field(field, hit.voxel.xyz, hit.inside, hit.type);
+// Shows the texel of a cube's face. `inside`: the position in the voxel, on the face.
+void show_texel(Hit hit, vec3 inside, inout Surface surface) {
+  Placed placed = placed_at(hit.voxel.w);
+  uint face = hit.face;
+  if (placed.ref_view.w == 1.0) turn_by_state(hit.type, hit.voxel.xyz, placed, face, inside);
+  show_texture(hit.type, face, inside, 0.0, surface);
 }
 
 // Places the vertex slightly in front of an instance's surface.
@@ -444,7 +450,9 @@ uint hit_matter(Hit hit, vec3 origin) {
   }
   vertex.is_ground = vertex.is_medium = false;
   bool is_on_face = !hit.in_field && !(kHasShapes && hit.in_shape);
-  put_on_surface(hit.voxel, is_on_face ? put_on_face(hit.inside, hit.face) : hit.inside, hit.normal);
+  vec3 inside = is_on_face ? put_on_face(hit.inside, hit.face) : hit.inside;
+  put_on_surface(hit.voxel, inside, hit.normal);
+  if (kHasTextures && is_on_face) show_texel(hit, inside, surface);
   vertex.colour = surface.colour;
   vertex.roughness = surface.roughness;
   vertex.metalness = surface.metalness;
@@ -686,14 +694,16 @@ void step_path() {
       bool has_first = false;
       bool has_next = false;
       while (glass.outcome == kGoesOn && !has_next && next_body(list, k, body)) {
-        Surface surface = surface_of_body(body);
         if (!is_own) {
-          passed *= passed_by(surface, body.lengths.z, has_own_length(body));
-        } else if (!is(kIsSeen) || (path.more.x == 0 && !has_first && surface.scattering > 0.0)) {
+          passed *= passed_by_body(body);
+        } else if (is_face(body)) {
+          if (!has_first || body.lengths.x <= end_within(first, body)) pass_face(body, u, glass);
+        } else if (!is(kIsSeen) || (path.more.x == 0 && !has_first && scatters(body))) {
           pass_through(body, u, glass);
         } else if (!has_first) {
           first = body;
           has_first = true;
+          if (is_within(first)) path.throughput.xyz *= tint_of(surface_of(type_of(first)), first.lengths.z);
         } else {
           has_next = true;
         }

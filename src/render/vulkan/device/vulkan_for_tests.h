@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <memory>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -78,6 +79,17 @@ class VulkanTest : public ::testing::Test {
   };
   static inline std::unique_ptr<Shared> shared_;
 };
+
+/// Returns noise of 16 x 16 texels; a third of them have the alpha `least_alpha`, the others 200.
+inline Texture noise_with_alpha(unsigned seed, std::uint8_t least_alpha) {
+  std::mt19937 random(seed);
+  AlphaImage image{16, 16, {}};
+  for (int i = 0; i < 256; ++i) {
+    for (int channel = 0; channel < 3; ++channel) image.rgba.push_back(static_cast<std::uint8_t>(random()));
+    image.rgba.push_back(random() % 3 == 0 ? least_alpha : std::uint8_t{200});
+  }
+  return Texture::from_image("noise", image).value();
+}
 
 /// Returns true if the distances around a pixel jump, or if a neighbour shows the background.
 inline bool is_at_silhouette(const FloatImage& depth, int x, int y) {

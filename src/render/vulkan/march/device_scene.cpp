@@ -72,11 +72,9 @@ bool can_be_traced(const Scene& scene, const Instance& instance, const SceneGrid
 const char* const kSendingTextures = "uploading textures";
 
 ShaderTexturedFace shader_face(const VoxelFace& of, const FaceTexels& face, std::uint64_t address) {
-  const auto axis = [&](std::size_t i) { return std::uint32_t{face.axis[i]} | (face.scale[i] < 0.0 ? 4U : 0U); };
   const std::uint32_t use = static_cast<std::uint32_t>(of.alpha) << 12 | std::uint32_t{of.turn} << 16 |
                             (of.mirrored ? std::uint32_t{1} << 18 : 0);
-  return {address, face.log_size | axis(0) << 4 | axis(1) << 8 | use, packed_colour(of.tint),
-          Vec4(face.tint, face.emission)};
+  return {address, axes_of(face) | use, packed_colour(of.tint), Vec4(face.tint, face.emission)};
 }
 
 // Returns the words of a type's six faces that hold its TriplanarRule: field_textures.glsl.
@@ -102,6 +100,11 @@ PlacedGrid placed_as(const Instance& instance, const SceneGrid& grid, InstanceHa
 }
 
 }  // namespace
+
+std::uint32_t axes_of(const FaceTexels& face) {
+  const auto axis = [&](std::size_t i) { return std::uint32_t{face.axis[i]} | (face.scale[i] < 0.0 ? 4U : 0U); };
+  return face.log_size | axis(0) << 4 | axis(1) << 8;
+}
 
 Status DeviceScene::update(const Scene& scene, InstanceFilter filter, Threads threads) {
   try {

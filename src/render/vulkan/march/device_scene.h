@@ -87,6 +87,9 @@ using KnownTexels = std::map<const Rgba8*, std::weak_ptr<const DeviceTexels>>;
 [[nodiscard]] Result<std::uint64_t> send_texels(ShaderMemory& memory, KnownTexels& all, const Texture& texture,
                                                 std::vector<std::shared_ptr<const DeviceTexels>>& used);
 
+/// Returns the size and axes of a face's texels, as in TexturedFace (data.glsl).
+[[nodiscard]] std::uint32_t axes_of(const FaceTexels& face);
+
 /// The textures of types' faces in device memory: texels, and a table of faces. Shaders follow the addresses of texels,
 /// so there are no limits of layers, sizes or numbers, except the memory.
 class DeviceTextures {

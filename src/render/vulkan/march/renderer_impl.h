@@ -56,6 +56,12 @@ struct VulkanRenderer::Impl {
     detail.look_at(*updated);
   }
 
+  /// Returns the features of images of a placement of the current scene.
+  [[nodiscard]] vulkan::PassFeatures features_of(const vulkan::Placement& placement) const {
+    return {placement.has_fields, placement.has_field_glass, !textures.empty(), placement.has_shapes,
+            placement.has_transparent && textures.has_cells()};
+  }
+
   std::unique_ptr<vulkan::Device> device;
   std::unique_ptr<vulkan::Pipelines> pipelines;
   vulkan::DeviceMemory memory;

@@ -34,8 +34,7 @@ class ImagePass {
         scene_(&renderer.scene),
         textures_(&renderer.textures),
         placement_(&placement),
-        features_{placement.has_fields, placement.has_field_glass, !renderer.textures.empty(), placement.has_shapes,
-                  placement.has_transparent && renderer.textures.has_cells()},
+        features_(renderer.features_of(placement)),
         light_(std::move(light)),
         content_(renderer.voxels),
         places_(renderer.memory, "drawing") {}

@@ -19,17 +19,7 @@ using render_test::random_faces;
 using render_test::sized;
 using render_test::towards;
 using vulkan_test::expect_equal;
-
-// Noise whose texels are visible or not, or hide half of the background.
-Texture noise_with_alpha(unsigned seed, std::uint8_t least_alpha) {
-  std::mt19937 random(seed);
-  AlphaImage image{16, 16, {}};
-  for (int i = 0; i < 256; ++i) {
-    for (int channel = 0; channel < 3; ++channel) image.rgba.push_back(static_cast<std::uint8_t>(random()));
-    image.rgba.push_back(random() % 3 == 0 ? least_alpha : std::uint8_t{200});
-  }
-  return Texture::from_image("noise", image).value();
-}
+using vulkan_test::noise_with_alpha;
 
 // A garden with a street of shapes; the types with glass are optional.
 struct Garden {

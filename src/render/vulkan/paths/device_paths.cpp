@@ -9,6 +9,7 @@
 #include <quoin/core/memory.h>
 
 #include "render/path/scatter.h"
+#include "render/vulkan/trees/tree_packing.h"
 
 namespace quoin::vulkan {
 namespace {
@@ -28,6 +29,17 @@ std::vector<Vec4> path_surface_table(const Surfaces& surfaces, std::size_t types
 // Returns true if the lamps have the same faces, and the same paths in the tree.
 bool has_same_faces(const path::PathLamps& a, const path::PathLamps& b) {
   return std::ranges::equal(a.faces(), b.faces()) && std::ranges::equal(a.tree().ways(), b.tree().ways());
+}
+
+// Sets the texture of a lamp. `all`: has the textures of all types.
+void put_texels(const path::PathLamp& from, const KnownTexels& all, ShaderPathLamp& lamp) {
+  const auto known = all.find(from.texels->texels);
+  const auto sent = known == all.end() ? nullptr : known->second.lock();
+  QUOIN_ASSERT(sent != nullptr, "a texture of the scene of the last update");
+  lamp.texels = sent->address();
+  lamp.texel_axes = axes_of(*from.texels);
+  lamp.turn = turn_bits(from.unturned) | static_cast<std::uint32_t>(from.face) << 16;
+  lamp.light_of_texel = Vec4(from.texels->tint * from.light_of_texel, from.voxel_size);
 }
 
 template <class T>
@@ -159,7 +171,7 @@ Status DevicePaths::put_faces(DeviceMemory& memory) {
   return done;
 }
 
-LampTables lamp_tables(const path::PathLamps& lamps, DVec3 view_origin) {
+LampTables lamp_tables(const path::PathLamps& lamps, const KnownTexels& texels, DVec3 view_origin) {
   LampTables tables;
   tables.lamps.reserve(lamps.size());
   for (const path::PathLamp& from : lamps.lamps()) {
@@ -169,6 +181,7 @@ LampTables lamp_tables(const path::PathLamps& lamps, DVec3 view_origin) {
     lamp.v = Vec4(from.v, from.size_v);
     lamp.normal = Vec4(from.normal, from.cos_inner);
     lamp.radiance = Vec4(from.radiance, from.cos_outer);
+    if (from.texels != nullptr) put_texels(from, texels, lamp);
   }
   const Vec3 to_view(lamps.origin() - view_origin);
   for (const path::LightTree::Node& from : lamps.tree().nodes()) {

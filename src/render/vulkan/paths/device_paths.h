@@ -62,11 +62,12 @@ class DevicePaths {
   Place face_lamps_;
 };
 
-/// An image's lamps in shader form, relative to the world position of view space's origin.
+/// An image's lamps in shader form, relative to the world position of view space's origin. `texels` has the textures of
+/// all types.
 struct LampTables {
   std::vector<ShaderPathLamp> lamps;
   std::vector<ShaderLampNode> nodes;
 };
-[[nodiscard]] LampTables lamp_tables(const path::PathLamps& lamps, DVec3 view_origin);
+[[nodiscard]] LampTables lamp_tables(const path::PathLamps& lamps, const KnownTexels& texels, DVec3 view_origin);
 
 }  // namespace quoin::vulkan

@@ -62,6 +62,10 @@ struct ShaderPathLamp {
   Vec4 v{0.0F};
   Vec4 normal{0.0F};
   Vec4 radiance{0.0F};
+  std::uint64_t texels = 0;
+  std::uint32_t texel_axes = 0;
+  std::uint32_t turn = 0;
+  Vec4 light_of_texel{0.0F};
 };
 
 struct ShaderLampNode {
@@ -88,6 +92,6 @@ struct PathPush {
 };
 
 static_assert(sizeof(ShaderPathFrame) == 10 * 16 + 12 * 8 + 12 * 4);
-static_assert(sizeof(ShaderPathLamp) == 80 && sizeof(ShaderLampNode) == 64 && sizeof(PathPush) == 40);
+static_assert(sizeof(ShaderPathLamp) == 112 && sizeof(ShaderLampNode) == 64 && sizeof(PathPush) == 40);
 
 }  // namespace quoin::vulkan

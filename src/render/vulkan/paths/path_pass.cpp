@@ -176,8 +176,8 @@ namespace quoin::vulkan {
 
 using PathImageImpl = VulkanPathImage::Impl;
 
-// The path tracing shader in the variants that scenes need: with glass, with fields, with transparent fields, with
-// shapes. Each variant is created at first use.
+// The path tracing shader in the variants that scenes need: with or without glass, by their features. Each variant is
+// created at first use.
 class PathPipelines {
  public:
   [[nodiscard]] static Result<std::unique_ptr<PathPipelines>> create(Device& device);
@@ -186,17 +186,19 @@ class PathPipelines {
   PathPipelines& operator=(const PathPipelines&) = delete;
 
   // Errors: those of VulkanRenderer.
-  [[nodiscard]] Status prepare(const Placement& placement);
+  [[nodiscard]] Status prepare(const PassFeatures& features, bool has_glass);
   // Records steps of a tile's paths, and a barrier before their results are read. Requires: it was prepared.
-  void dispatch(VkCommandBuffer commands, const Placement& placement, const PathPush& push) const;
+  void dispatch(VkCommandBuffer commands, const PassFeatures& features, bool has_glass, const PathPush& push) const;
 
  private:
   explicit PathPipelines(Device& device) : device_(&device) {}
-  [[nodiscard]] static std::size_t variant_of(const Placement& placement);
+  [[nodiscard]] static std::size_t variant_of(const PassFeatures& features, bool has_glass) {
+    return 2 * features.index() + (has_glass ? 1 : 0);
+  }
 
   Device* device_;
   VkPipelineLayout layout_ = VK_NULL_HANDLE;
-  std::array<VkPipeline, 16> pipelines_{};
+  std::array<VkPipeline, 2 * PassFeatures::kCount> pipelines_{};
 };
 
 namespace {
@@ -204,11 +206,6 @@ namespace {
 constexpr std::uint32_t kPaths[] = {
 #include "paths.comp.inc"
 };
-
-constexpr std::size_t kGlass = 1;
-constexpr std::size_t kFields = 2;
-constexpr std::size_t kFieldGlass = 4;
-constexpr std::size_t kShapes = 8;
 
 }  // namespace
 
@@ -227,27 +224,27 @@ PathPipelines::~PathPipelines() {
   if (layout_ != VK_NULL_HANDLE) api.vkDestroyPipelineLayout(device_->handle(), layout_, nullptr);
 }
 
-std::size_t PathPipelines::variant_of(const Placement& placement) {
-  return (placement.has_transparent ? kGlass : 0) | (placement.has_fields ? kFields : 0) |
-         (placement.has_field_glass ? kFieldGlass : 0) | (placement.has_shapes ? kShapes : 0);
-}
-
-Status PathPipelines::prepare(const Placement& placement) {
-  const std::size_t variant = variant_of(placement);
-  if (pipelines_[variant] != VK_NULL_HANDLE) return {};
-  const std::array constants = {
-      ShaderConstant{0, (variant & kGlass) != 0}, ShaderConstant{4, (variant & (kFields | kFieldGlass)) != 0},
-      ShaderConstant{6, (variant & kFieldGlass) != 0}, ShaderConstant{8, (variant & kShapes) != 0}};
-  const VkResult result = make_compute_pipeline(*device_, layout_, kPaths, constants, pipelines_[variant]);
+Status PathPipelines::prepare(const PassFeatures& features, bool has_glass) {
+  VkPipeline& pipeline = pipelines_[variant_of(features, has_glass)];
+  if (pipeline != VK_NULL_HANDLE) return {};
+  const std::array constants = {ShaderConstant{0, has_glass},
+                                ShaderConstant{4, features.fields || features.field_glass},
+                                ShaderConstant{6, features.field_glass},
+                                ShaderConstant{7, features.textures},
+                                ShaderConstant{8, features.shapes},
+                                ShaderConstant{9, features.cells}};
+  const VkResult result = make_compute_pipeline(*device_, layout_, kPaths, constants, pipeline);
   return device_->check(result, "compiling shaders");
 }
 
-void PathPipelines::dispatch(VkCommandBuffer commands, const Placement& placement, const PathPush& push) const {
+void PathPipelines::dispatch(VkCommandBuffer commands, const PassFeatures& features, bool has_glass,
+                             const PathPush& push) const {
   constexpr std::int32_t kGroup = 8;
   const auto groups = [](std::int32_t pixels) { return static_cast<std::uint32_t>((pixels + kGroup - 1) / kGroup); };
-  QUOIN_ASSERT(pipelines_[variant_of(placement)] != VK_NULL_HANDLE, "a variant that was prepared");
+  const VkPipeline pipeline = pipelines_[variant_of(features, has_glass)];
+  QUOIN_ASSERT(pipeline != VK_NULL_HANDLE, "a variant that was prepared");
   const Api& api = device_->api();
-  api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_[variant_of(placement)]);
+  api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
   api.vkCmdPushConstants(commands, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof push, &push);
   api.vkCmdDispatch(commands, groups(push.size_x), groups(push.size_y), 1);
   device_->separate(commands);
@@ -286,6 +283,8 @@ class PathPass {
 
   RendererImpl* renderer_;
   PathImageImpl* image_;
+  PassFeatures features_;
+  bool has_glass_;
   Places places_;
   std::uint64_t frame_address_ = 0;
   std::int32_t tile_edge_ = 0;
@@ -349,12 +348,16 @@ int tile_edge(const Device& device, int samples, bool has_glass) {
 }  // namespace
 
 PathPass::PathPass(RendererImpl& renderer, PathImageImpl& image)
-    : renderer_(&renderer), image_(&image), places_(renderer.memory, kDoing) {}
+    : renderer_(&renderer),
+      image_(&image),
+      features_(renderer.features_of(renderer.scene.placement())),
+      has_glass_(renderer.scene.placement().has_transparent),
+      places_(renderer.memory, kDoing) {}
 
 Status PathPass::put_lamps(DVec3 view_origin, ShaderPathFrame& paths) {
   const path::PathLamps* const lamps = renderer_->paths->tables.lamps();
   if (lamps == nullptr || lamps->empty()) return {};
-  const LampTables tables = lamp_tables(*lamps, view_origin);
+  const LampTables tables = lamp_tables(*lamps, renderer_->texels, view_origin);
   paths.lamp_count = static_cast<std::uint32_t>(tables.lamps.size());
   Status done = places_.upload(tables.lamps, paths.lamps);
   if (done) done = places_.upload(tables.nodes, paths.lamp_nodes);
@@ -363,8 +366,7 @@ Status PathPass::put_lamps(DVec3 view_origin, ShaderPathFrame& paths) {
 
 Status PathPass::put_tile_buffers(int samples, ShaderFrame& frame, ShaderPathFrame& paths) {
   const PathOptions& options = image_->options;
-  const bool has_glass = renderer_->scene.placement().has_transparent;
-  tile_edge_ = tile_edge(*renderer_->device, samples, has_glass);
+  tile_edge_ = tile_edge(*renderer_->device, samples, has_glass_);
   const auto pixels = static_cast<std::size_t>(std::min(tile_edge_, options.width)) *
                       static_cast<std::size_t>(std::min(tile_edge_, options.height));
   for (Buffer* buffer : {&counters_, &results_}) {
@@ -377,7 +379,7 @@ Status PathPass::put_tile_buffers(int samples, ShaderFrame& frame, ShaderPathFra
   paths.sums = image_->sums.address();
   if (image_->parts.size() > 0) paths.parts = image_->parts.address();
   Status done = places_.reserve(pixels * kPathStateBytes, paths.states);
-  if (done && has_glass) done = places_.reserve(pixels * kBodies * kBodyBytes, frame.bodies);
+  if (done && has_glass_) done = places_.reserve(pixels * kBodies * kBodyBytes, frame.bodies);
   return done;
 }
 
@@ -406,6 +408,7 @@ Status PathPass::put_frame(int samples) {
   frame.surfaces = renderer_->paths->tables.surfaces_address();
   frame.last_surface = renderer_->paths->tables.last_surface();
   renderer_->scene.put_shapes_in(frame);
+  renderer_->textures.put_in(frame);
   done = put_lamps(view_origin, paths);
   if (done) done = places_.upload(data.placed, frame.placed);
   if (done) done = places_.upload(data.tree, frame.tree);
@@ -436,7 +439,7 @@ Status PathPass::take(const Tile& tile, int first, int count, const Progress& pr
       for (int i = 0; i < kDispatchesAtOnce; ++i) {
         api.vkCmdFillBuffer(commands, counters_.handle(), offsetof(ShaderCounters, pending), 4, 0);
         renderer_->device->separate(commands);
-        renderer_->paths->pipelines->dispatch(commands, renderer_->scene.placement(), push);
+        renderer_->paths->pipelines->dispatch(commands, features_, has_glass_, push);
         push.begins = 0;
       }
       const VkBufferCopy all{0, 0, sizeof(ShaderCounters)};
@@ -472,7 +475,7 @@ Status PathPass::add_samples(int samples, const Progress& progress) {
 }
 
 Status PathPass::draw(int samples, const Progress& progress) {
-  Status done = renderer_->paths->pipelines->prepare(renderer_->scene.placement());
+  Status done = renderer_->paths->pipelines->prepare(features_, has_glass_);
   if (done) done = put_frame(samples);
   if (done) {
     done = renderer_->device->run(kDoing, [&](VkCommandBuffer commands) {

@@ -347,12 +347,15 @@ void ChunkRecord::move_to(std::uint64_t address) {
 }
 
 std::uint32_t state_turn(const StateOrientations& orientations, std::uint32_t state) {
-  const AxisOrientation back = orientations.of(state).inverse();
+  return turn_bits(orientations.of(state).inverse());
+}
+
+std::uint32_t turn_bits(const AxisOrientation& orientation) {
   std::uint32_t turn = 0;
   for (std::uint32_t axis = 0; axis < 3; ++axis) {
     IVec3 along(0);
     along[static_cast<int>(axis)] = 1;
-    const IVec3 turned = back.apply(along);
+    const IVec3 turned = orientation.apply(along);
     for (int i = 0; i < 3; ++i) {
       if (turned[i] != 0) turn |= (axis | (turned[i] < 0 ? 4U : 0U)) << (3 * i);
     }

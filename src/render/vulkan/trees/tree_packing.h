@@ -46,6 +46,8 @@ struct ChunkRecord {
 /// Returns the turn from a cube in the grid to the unturned cube, for a state: three bits per axis of the unturned
 /// cube, the number of the grid's axis there, plus 4 if it points against it.
 [[nodiscard]] std::uint32_t state_turn(const StateOrientations& orientations, std::uint32_t state);
+/// Returns an orientation in the same form: how `apply` moves the axes.
+[[nodiscard]] std::uint32_t turn_bits(const AxisOrientation& orientation);
 
 /// Packs a field chunk: like a chunk of voxels, a tree of the cells that touch its solid, with the materials of its
 /// samples. The words of a brick's cells are followed by one number per word: the offset of its samples in words from
