@@ -315,6 +315,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   uvec2 textured_faces;
   uvec2 shape_grids;   // ShapeTrees of the first grids; the others have no shapes
   uvec2 shape_models;  // vectors: shapes.glsl
+  uvec2 shape_means;   // per type: the mean colour of its shapes, for cells of halved grids; negative for a type
+                       // without shapes; w: the emission, as a multiple of colours
   uint shaped_grids;   // their number
 };
 

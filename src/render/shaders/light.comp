@@ -266,6 +266,9 @@ Surface surface_at(Point point, Placed placed) {
     float spacing = frame().down.w / placed.ref_inside.w;
     if (has(kPerspective)) spacing *= point.inside.w;
     show_side(point.what.y, point.inside.xyz, spacing * spacing, surface);
+  } else if (kHasShapes && !is_of_field(point) && placed.ref_view.w != 1.0 &&
+             show_mean_of_shapes(point.what.x, surface)) {
+    return surface;
   } else if (kHasTextures && !is_of_field(point)) {
     show_texture(point, placed, surface);
   }

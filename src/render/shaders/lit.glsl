@@ -19,6 +19,14 @@ Surface surface_of(uint type) {
 
 #include "textures.glsl"
 
+// Shows the look of a cell of a halved grid, if its type has shapes. Returns true if it has.
+bool show_mean_of_shapes(uint type, inout Surface surface) {
+  vec4 mean = mean_of_shapes(type);
+  if (mean.x < 0.0) return false;
+  set_texel(mean.xyz, vec4(1.0, 1.0, 1.0, mean.w), surface);
+  return true;
+}
+
 // Returns true if an opaque type darkens corners.
 bool occludes(uint type) {
   return Vectors(frame().surfaces).at[3 * min(type, frame().last_surface) + 2].w == 0.0;

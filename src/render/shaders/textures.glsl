@@ -10,6 +10,12 @@ uint texture_entry(uint type) {
   return Numbers(frame().texture_numbers).at[min(type, frame().last_surface)];
 }
 
+// Returns the mean colour of a type's shapes, which cells of halved grids show; negative if it has none. w: the
+// emission.
+vec4 mean_of_shapes(uint type) {
+  return Vectors(frame().shape_means).at[min(type, frame().last_surface)];
+}
+
 // Returns the number of a type's textured faces, from 1; 0 if it has none.
 uint textures_of(uint type) {
   return texture_entry(type) & kTextureNumber;

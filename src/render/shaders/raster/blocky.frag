@@ -49,9 +49,11 @@ vec4 colour_of_shape() {
 
 vec4 colour_of_quad() {
   bool is_textured = kHasTextures && texels.w != 0;
+  if (!is_textured && !kTraces) return colour;
   if (!is_textured) {
-    if (kTraces) return colour_of_face(what.x, surface_of(uint(base.w)), what.y, light_of(what.x), place.w);
-    return colour;
+    Surface surface = surface_of(uint(base.w));
+    if (shows_means(what.y)) show_mean_of_shapes(uint(base.w), surface);
+    return colour_of_face(what.x, surface, what.y, light_of(what.x), place.w);
   }
   vec3 at = before_face(what.x, 0.0);
   vec3 behind = at;

@@ -137,6 +137,8 @@ void main() {
            openness_of(bits.x >> 30 | (bits.y & 63) << 2, corner));
   texels = texture_shown;
   if (kHasTextures && !has_textured_cells()) texels = texels_of(type, shown, orientation);
+  // Cells of types with shapes have the mean colour of their sides.
+  if (kHasTextures && texels.w != 0 && shows_means(placed) && mean_of_shapes(type).x >= 0.0) texels = uvec4(0);
   viewer = vec4(0.0);
   if (kHasTextures && texels.w != 0) put_viewer(placed);
 }

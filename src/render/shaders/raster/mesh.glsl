@@ -46,7 +46,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Me
   uvec2 frame;  // of the image, shared with marched images
   uvec2 draws;
   uvec2 order;  // draw and quad indices of the transparent quads, in drawing order
-  uvec2 emissions;  // of types, as multiples of their colours: a number per type, as in `surfaces`
+  uvec2 pad;
   vec4 sun;  // direction to it in the world; its length is the brightness
   MeshInstance instances[];
 };
@@ -102,6 +102,12 @@ bool draws_edges() {
 float diffuse_of(uint face, uint instance) {
   vec4 diffuse = mesh_frame().instances[instance].diffuse[face >> 2];
   return diffuse[face & 3];
+}
+
+// Returns true if an instance is a halved grid, or far away: its faces show the means of their textures.
+bool shows_means(uint instance) {
+  vec4 axis = mesh_frame().instances[instance].axes[0];
+  return axis.w >= 1e15;
 }
 
 vec4 clip_from(vec4 clip[4], vec3 point) {

@@ -59,8 +59,11 @@ float openness_of(uint corners, uint corner) {
 }
 
 // Returns the surface of a face, in the colour that its fragments do not change. `face`: of the type.
-Surface surface_at_corner(uint face, uint type) {
+Surface surface_at_corner(uint face, uint type, uint instance) {
   Surface surface = surface_of(type);
+#ifndef IS_IMPOSTOR
+  if (shows_means(instance) && show_mean_of_shapes(type, surface)) return surface;
+#endif
   if (!kHasTextures) return surface;
 #ifdef IS_IMPOSTOR
   show_texture(type, face, vec3(0.0), kMeanOfFace, surface);
@@ -85,6 +88,6 @@ void put_face(uint face, uint shown, uint type, uint instance, vec3 local, vec3 
   what = uvec2(face, instance);
   colour = vec4(0.0);
   if (kTraces) return;
-  Surface surface = surface_at_corner(shown, type);
+  Surface surface = surface_at_corner(shown, type, instance);
   colour = colour_of_face(face, surface, instance, sunlight_of(diffuse_of(face, instance)), openness);
 }

@@ -96,7 +96,10 @@ void put_shape(Seen seen, uvec2 records, uvec2 shapes, uint number, uint index, 
   }
   gl_Position = clip_from(seen.clip, point + widened);
 
-  if ((found.z & kOwnLook) != 0) emission = Floats(mesh_frame().emissions).at[min(type, frame().last_surface)];
+  if ((found.z & kOwnLook) != 0) {
+    vec4 mean = mean_of_shapes(type);
+    emission = mean.w;
+  }
   uint direction = found.z >> kNormalShift & 7;
   ivec4 home = mesh_frame().instances[placed].home;
   place = vec4(local + widened, openness_of(words.x >> 18 & 0xFF, corner));

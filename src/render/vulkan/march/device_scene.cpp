@@ -129,6 +129,8 @@ void DeviceScene::clear() {
   memory_->release(surfaces_place_);
   memory_->release(shapes_place_);
   shape_table_.clear();
+  memory_->release(means_place_);
+  mean_table_.clear();
   if (shapes_ != nullptr) shapes_->clear();
   surface_table_.clear();
   followed_types_ = followed_visibility_ = followed_scene_ = {};
@@ -567,15 +569,35 @@ std::vector<Vec4> surface_table(const VoxelRegistry& types) {
   std::vector<Vec4> table;
   for (std::size_t type = 0; type <= types.size(); ++type) {
     const auto id = static_cast<VoxelType>(std::min(type, kMaxVoxelTypes));
-    add_surface(surfaces[id], types.is_opaque(id) && !types.occludes(id) ? 1.0F : 0.0F, table);
+    // Cells of shapes in halved grids are opaque, but darken no corners.
+    const bool is_open = !types.occludes(id) && (types.is_opaque(id) || types.is_shaped(id));
+    add_surface(surfaces[id], is_open ? 1.0F : 0.0F, table);
   }
   return table;
+}
+
+std::vector<Vec4> shape_means(const VoxelRegistry& types) {
+  std::vector<Vec4> means;
+  for (std::size_t i = 0; i < types.size(); ++i) {
+    const auto type = static_cast<VoxelType>(i);
+    const Vec3 mean = types.is_shaped(type) ? mean_of_shapes(types[type]) : Vec3(-1.0F);
+    means.emplace_back(mean, emission_of(types[type]));
+  }
+  means.emplace_back(Vec3(-1.0F), 0.0F);
+  return means;
 }
 
 Status DeviceScene::put_surfaces(const VoxelRegistry& types) {
   std::vector<Vec4> table = surface_table(types);
   last_surface_ = static_cast<std::uint32_t>(types.size());
-  has_unoccluding_ = types.has_unoccluding();
+  has_unoccluding_ = types.has_unoccluding() || (shapes_ != nullptr && types.has_shapes());
+  std::vector<Vec4> means;
+  if (shapes_ != nullptr && types.has_shapes()) means = shape_means(types);
+  if (means != mean_table_) {
+    mean_table_ = std::move(means);
+    Status done = mean_table_.empty() ? Status{} : put_table(*memory_, means_place_, bytes_of(mean_table_));
+    if (!done) return done;
+  }
   if (table == surface_table_) return {};
   surface_table_ = std::move(table);
   return put_table(*memory_, surfaces_place_, bytes_of(surface_table_));
@@ -611,6 +633,7 @@ void DeviceScene::put_shapes_in(ShaderFrame& frame) const {
   frame.shape_grids = shapes_place_.address;
   frame.shaped_grids = static_cast<std::uint32_t>(shape_table_.size());
   frame.shape_models = shapes_->address();
+  frame.shape_means = means_place_.address;
 }
 
 }  // namespace quoin::vulkan

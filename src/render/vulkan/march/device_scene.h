@@ -61,6 +61,8 @@ void add_surface(const Surface& surface, float last, std::vector<Vec4>& table);
 /// Returns the surfaces of all types in the form of shaders/data.glsl: three vectors each; the last entry is for types
 /// out of range. Requires: a frame with it has kUnoccluding if any of the types does not occlude.
 [[nodiscard]] std::vector<Vec4> surface_table(const VoxelRegistry& types);
+/// Returns `shape_means` of shaders/data.glsl for all types; the last entry is for types out of range.
+[[nodiscard]] std::vector<Vec4> shape_means(const VoxelRegistry& types);
 
 /// The texels of a texture in device memory, of all mipmap levels.
 class DeviceTexels {
@@ -250,6 +252,8 @@ class DeviceScene {
   std::vector<ShaderShapes> shape_table_;  // empty without shapes
   Place surfaces_place_;
   std::vector<Vec4> surface_table_;
+  Place means_place_;  // of shapes
+  std::vector<Vec4> mean_table_;
   std::uint32_t last_surface_ = 0;
   bool has_unoccluding_ = false;
 };

@@ -161,6 +161,38 @@ TEST_F(VulkanShapes, LightOfShapesMatchesCpu) {
   }
 }
 
+// Cells of halved grids have the mean colour of their shapes' sides.
+TEST_F(VulkanShapes, HalvedShapesMatchCpu) {
+  Garden garden(false);
+  Grid& grid = garden.scene.edit(garden.grid).grid;
+  grid.fill_box({{-16, -16, -16}, {16, 0, 16}}, garden.types.stone);
+  grid.fill_box({{-12, 0, -12}, {-2, 8, -2}}, garden.textured);
+  grid.fill_box({{0, 0, -12}, {12, 6, -4}}, garden.types.slab);
+  grid.fill_box({{0, 0, 0}, {10, 8, 10}}, garden.leaf);
+  grid.fill_box({{-12, 0, 2}, {-4, 6, 10}}, garden.types.stairs);
+  garden.add_turned({-30.0, 7.5, 2.0});
+  const Camera camera = towards({60, 45, 80}, {-4, 0, 0}, 0.6);
+  RenderOptions options = sized(128, 96);
+  const RenderedImage whole = render_test::taken(garden.scene, camera, vulkan_test::of_day(options));
+  options.detail.policy =
+      DetailPolicy{.rule = DetailPolicy::Rule::ByPixels, .voxel_pixels = 1e6, .cell_pixels = 12, .far_pixels = 0};
+  compare(garden.scene, camera, options, "halved");
+  const RenderedImage halved = taken_as_is(camera, vulkan_test::of_day(options));
+  EXPECT_NE(halved.depth.values, whole.depth.values);
+  options.light.occlusion_mode = OcclusionMode::Vertex;
+  compare(garden.scene, camera, options, "halved_vertex");
+  // Types keep their colour, their shapes get another one.
+  options.light.occlusion_mode = RenderOptions().light.occlusion_mode;
+  VoxelProperties slab = garden.scene.types[garden.types.slab];
+  ShapeElement half{.min = {0, 0, 0}, .max = {16, 8, 16}};
+  for (ElementFace& face : half.faces) face.face = VoxelFace{.tint = {40, 90, 230}};
+  slab.shapes = *VoxelShape::from_elements({half});
+  garden.scene.types.replace(garden.types.slab, slab);
+  const RenderedImage blue = render_test::taken(garden.scene, camera, vulkan_test::of_day(options));
+  EXPECT_GT(vulkan_test::differences(halved, blue).pixels, 50);
+  compare(garden.scene, camera, options, "halved_blue");
+}
+
 // Blocks of leaves, stained glass, and cells with faces of all kinds.
 TEST_F(VulkanShapes, CutoutAndTranslucentCubesMatchCpu) {
   if (!is_nightly()) GTEST_SKIP() << "nightly only";

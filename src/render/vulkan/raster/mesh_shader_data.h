@@ -43,7 +43,7 @@ struct ShaderMeshFrame {
   std::uint64_t frame = 0;  ///< a ShaderFrame
   std::uint64_t draws = 0;
   std::uint64_t order = 0;
-  std::uint64_t emissions = 0;
+  std::uint64_t pad = 0;
   Vec4 sun{0.0F};
 };
 

@@ -11,11 +11,13 @@
 #include <glm/geometric.hpp>
 
 #include <quoin/core/assert.h>
+#include <quoin/grid/downsample.h>
 
 #include "core/caches.h"
 #include "render/vulkan/raster/mesh_shader_data.h"
 #include "render/vulkan/trees/shader_data.h"
 #include "scene/tracer/placed_grid.h"
+#include "scene/tracer/tree_cache.h"
 
 namespace quoin::vulkan {
 namespace {
@@ -399,6 +401,23 @@ const MeshStore::StoredGrid* MeshStore::find(MeshKey key) {
   return &grid;
 }
 
+namespace {
+
+// Returns the types of halved grids. Their cells of shapes darken no corners, as in images of the CPU.
+VoxelRegistry types_of_levels(const VoxelRegistry& types) {
+  VoxelRegistry cubes = types_of_halved(types);
+  for (std::size_t i = 0; i < types.size(); ++i) {
+    const auto type = static_cast<VoxelType>(i);
+    if (!types.is_shaped(type) || !cubes.is_opaque(type)) continue;
+    VoxelProperties cube = cubes[type];
+    cube.occludes = false;
+    cubes.replace(type, std::move(cube));
+  }
+  return cubes;
+}
+
+}  // namespace
+
 void LevelMeshes::clear() {
   for (const auto& [key, level] : levels_) store_->drop(key);
   levels_.clear();
@@ -406,7 +425,8 @@ void LevelMeshes::clear() {
 
 void LevelMeshes::look_at(const Scene& scene) {
   PendingChanges types(followed_types_, scene.types);
-  const bool is_seen_otherwise = has_other_visibility(*types);
+  const bool is_seen_otherwise = has_other_visibility(*types) || has_other_shapes(*types, scene.types);
+  if (!types->empty()) cubes_.reset();
   for (auto level = levels_.begin(); level != levels_.end();) {
     const auto each = level++;
     if (scene.grids().find(each->first.grid) == nullptr) {
@@ -457,7 +477,9 @@ Status LevelMeshes::put_updates(MeshKey key, Level& level, const PlacedGrid& pla
   SceneGrid content;
   if (key.content == SurfaceContent::Voxels) content.grid = placed.voxels->snapshot();
   if (key.content == SurfaceContent::Field && placed.field != nullptr) content.field = placed.field->field().snapshot();
-  const std::vector<SurfaceUpdate> updates = level.surfaces->update(content, types, threads);
+  const bool has_shapes = key.content == SurfaceContent::Voxels && types.has_shapes();
+  if (has_shapes && !cubes_) cubes_ = types_of_levels(types);
+  const std::vector<SurfaceUpdate> updates = level.surfaces->update(content, has_shapes ? *cubes_ : types, threads);
   return updates.empty() ? Status{} : store_->put(updates, key.level);
 }
 

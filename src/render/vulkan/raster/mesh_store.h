@@ -5,10 +5,12 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include <quoin/core/changes.h>
+#include <quoin/grid/voxel_registry.h>
 #include <quoin/render/chunk_surface.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
@@ -177,6 +179,7 @@ class LevelMeshes {
   MeshStore* store_;
   std::map<MeshKey, Level> levels_;
   ChangeCursor followed_types_;
+  std::optional<VoxelRegistry> cubes_;  // the types without shapes; made when a level first needs it
   std::uint64_t image_ = 0;
 };
 

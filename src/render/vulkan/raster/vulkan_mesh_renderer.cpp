@@ -88,7 +88,7 @@ struct VulkanMeshRenderer::Impl {
         textures(of_renderer.memory, of_renderer.texels) {}
   ~Impl() {
     memory->release(surfaces);
-    memory->release(emissions);
+    memory->release(means);
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -116,12 +116,12 @@ struct VulkanMeshRenderer::Impl {
   InstanceFilter shown = InstanceFilter::Visible;
   std::vector<vulkan::MeshInstance> instances;  // in the order of their handles; voxels, then the field
   vulkan::Place surfaces;
-  std::vector<Vec4> surface_table;    // the content of `surfaces`
-  vulkan::Place emissions;            // of types; faces of shapes read it, also those of former types
-  std::vector<float> emission_table;  // its content
-  bool has_unoccluding = false;       // some of its opaque types do not darken corners
-  vulkan::DeviceTextures textures;    // of the same types
-  vulkan::SolidFaces solid;           // of the same types
+  std::vector<Vec4> surface_table;  // the content of `surfaces`
+  vulkan::Place means;              // of shapes; faces of shapes read it, also those of former types
+  std::vector<Vec4> mean_table;     // its content
+  bool has_unoccluding = false;     // some of its opaque types do not darken corners
+  vulkan::DeviceTextures textures;  // of the same types
+  vulkan::SolidFaces solid;         // of the same types
   std::int64_t drawn_triangles = 0;
 };
 
@@ -176,17 +176,16 @@ void VulkanMeshRenderer::Impl::place(const Scene& of_scene, InstanceFilter filte
 
 Status VulkanMeshRenderer::Impl::put_surfaces(const VoxelRegistry& types) {
   std::vector<Vec4> table = vulkan::surface_table(types);
-  std::vector<float> glow(types.size() + 1);
-  for (std::size_t i = 0; i + 1 < glow.size(); ++i) glow[i] = emission_of(types[static_cast<VoxelType>(i)]);
-  if (table == surface_table && glow == emission_table) return {};
+  std::vector<Vec4> of_shapes = vulkan::shape_means(types);
+  if (table == surface_table && of_shapes == mean_table) return {};
   surface_table.clear();
   Status done = vulkan::put_table(*memory, surfaces, std::as_bytes(std::span(table)));
-  if (done) done = vulkan::put_table(*memory, emissions, std::as_bytes(std::span(glow)));
+  if (done) done = vulkan::put_table(*memory, means, std::as_bytes(std::span(of_shapes)));
   if (done) done = memory->flush();
   if (done) {
     surface_table = std::move(table);
-    emission_table = std::move(glow);
-    has_unoccluding = types.has_unoccluding();
+    mean_table = std::move(of_shapes);
+    has_unoccluding = types.has_unoccluding() || types.has_shapes();
   } else {
     memory->discard();
   }
@@ -288,9 +287,9 @@ Status VulkanMeshRenderer::Impl::put_image(const vulkan::Placement& placement, c
   frame.surfaces = surfaces.address;
   frame.last_surface = static_cast<std::uint32_t>(std::max<std::size_t>(surface_table.size() / 3, 1) - 1);
   if (has_unoccluding) frame.flags |= vulkan::kUnoccluding;
-  data.frame.emissions = emissions.address;
   textures.put_in(frame);
   renderer->scene.put_shapes_in(frame);
+  frame.shape_means = means.address;
   const bool shows_colours = !shows_values(request.light.shading) && !request.detail.colours;
   data.has_textures = shows_colours && !textures.empty();
   data.has_type_textures = !textures.empty();

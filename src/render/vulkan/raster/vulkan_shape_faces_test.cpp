@@ -265,6 +265,40 @@ TEST_F(VulkanShapeFaces, EditsMatchCpu) {
   expect_like(drawn(camera, mesh_options(options)), render_test::taken(yard.scene, camera, options), "edited_voxels");
 }
 
+// Cells of halved grids have the mean colour of their shapes' sides.
+TEST_F(VulkanShapeFaces, HalvedShapesMatchCpu) {
+  Yard yard;
+  Grid& grid = yard.scene.edit(yard.grid).grid;
+  grid.fill_box({{-16, -16, -16}, {16, 0, 16}}, yard.types.stone);
+  grid.fill_box({{-12, 0, -12}, {-2, 8, -2}}, yard.textured_stairs);
+  grid.fill_box({{0, 0, -12}, {12, 6, -4}}, yard.textured_fence);
+  grid.fill_box({{0, 0, 0}, {10, 8, 10}}, yard.types.slab);
+  const Camera camera = towards({60, 45, 80}, {0, 0, 0}, 0.6);
+  RenderOptions options = plain_light(128, 96);
+  options.detail.policy =
+      DetailPolicy{.rule = DetailPolicy::Rule::ByPixels, .voxel_pixels = 1e6, .cell_pixels = 12, .far_pixels = 0};
+  compare(yard.scene, camera, options, "halved");
+  const std::int64_t triangles = meshes_->stats().drawn_triangles;
+  options.light.occlusion_mode = OcclusionMode::Vertex;
+  compare(yard.scene, camera, options, "halved_vertex");
+  RenderOptions whole = options;
+  whole.detail.policy.reset();
+  (void)drawn(camera, mesh_options(vulkan_test::of_day(whole)));
+  EXPECT_LT(triangles, meshes_->stats().drawn_triangles);
+  // Types keep their colour, their shapes get another one.
+  const Image before = drawn(camera, mesh_options(vulkan_test::of_day(options)));
+  VoxelProperties slab = yard.scene.types[yard.types.slab];
+  ShapeElement half{.min = {0, 0, 0}, .max = {16, 8, 16}};
+  for (ElementFace& face : half.faces) face.face = VoxelFace{.tint = {40, 90, 230}};
+  slab.shapes = *VoxelShape::from_elements({half});
+  yard.scene.types.replace(yard.types.slab, slab);
+  compare(yard.scene, camera, options, "halved_blue");
+  const Image after = drawn(camera, mesh_options(vulkan_test::of_day(options)));
+  EXPECT_GT(vulkan_test::bytes_that_differ(before, after, 20), 50);
+  if (!is_nightly()) return;
+  compare(yard.scene, camera, with_mesh_light(options), "halved_lit");
+}
+
 TEST_F(VulkanShapeFaces, NormalsMatchCpu) {
   if (!is_nightly()) GTEST_SKIP() << "nightly only";
   Yard yard;

@@ -274,6 +274,7 @@ struct ShaderFrame {
   std::uint64_t textured_faces = 0;
   std::uint64_t shape_grids = 0;
   std::uint64_t shape_models = 0;
+  std::uint64_t shape_means = 0;
   std::uint32_t shaped_grids = 0;
   std::uint32_t pad = 0;
 };
@@ -334,7 +335,7 @@ static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGri
               sizeof(ShaderShapes) == 96);
 static_assert(sizeof(ShaderFarFace) == 32 && sizeof(ShaderVoxelFace) == 16 && sizeof(ShaderFar) == 21 * 16 &&
               sizeof(ShaderFarCell) == 128);
-static_assert(sizeof(ShaderPlaced) == 384 && sizeof(ShaderFrame) == 20 * 16 + 30 * 8 + 22 * 4);
+static_assert(sizeof(ShaderPlaced) == 384 && sizeof(ShaderFrame) == 20 * 16 + 31 * 8 + 22 * 4);
 static_assert(sizeof(ShaderLamp) == 13 * 16 && sizeof(ShaderTexturedFace) == 48);
 static_assert(sizeof(ShaderPush) == 104 && sizeof(ShaderCounters) == 16);
 
