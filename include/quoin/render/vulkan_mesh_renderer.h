@@ -56,7 +56,7 @@ struct MeshImageOptions {
 /// Shapes:   a visible face takes 8 bytes of device memory, and each different face of a chunk's models 112. Occlusion
 ///           is that of the mesh, also inside of voxels, where CpuRenderer has none with `OcclusionMode::Vertex`.
 /// Cutouts:  texels that are not visible show the background. Both sides of cutout faces are drawn; the inner one has
-///           the occlusion of the outer one. For rays, cubes with such faces are glass of their mean colour.
+///           the occlusion of the outer one. Rays meet the same texels.
 /// Light:    rays from each visible point through the VulkanRenderer's voxels, at the image's level of detail, find
 ///           shadows and lamp light. Everything that casts shadows in that renderer also casts them here, drawn or not.
 ///           Rays from smooth surfaces start one voxel in front of the surface. Glass tints sunlight separately per

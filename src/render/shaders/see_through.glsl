@@ -27,7 +27,8 @@ vec3 normal_of_side(Body body, bool is_entered) {
   if (kHasFieldGlass && (body.what.z & in_field) != 0) {
     return field_normal(instance, is_entered ? normal_of(body.what.y) : normal_from_28(body.what.z >> kExitNormal));
   }
-  return normal_met(instance, is_entered ? body.what.y : body.what.w & 7, is_entered ? body.lengths.x : body.lengths.y);
+  uint face = (is_entered ? body.what.y : body.what.w) & 7;
+  return normal_met(instance, face, is_entered ? body.lengths.x : body.lengths.y);
 }
 
 // Adds a surface that reflects the sky. `normal`: unit, in the world; `tint`: of the reflection.

@@ -16,8 +16,9 @@ const bool kHasGlass = true;
 layout(location = 0) out vec4 pixel;
 
 // Lengths of the ray, in voxels, between its start and the fragment: behind the face of a cube; before that of a shape,
-// whose box the ray then enters.
+// whose box the ray then enters, and before that of a cube with a texture.
 const float kWithin = 1e-4;
+const bool kStartsBefore = kPart == kShapes || kHasCells;
 
 vec3 normal_met(int instance, uint face, float t) {
   return face_normal(placed_at(instance), face);
@@ -29,14 +30,14 @@ LitPoint point_of_body(Body body) {
     vec3 normal = normal_of_side(body, true);
     return point_of_body(body, placed, normal, max(dot(normal, mesh_frame().sun.xyz), 0.0));
   }
-  uint face = body.what.y;
+  uint face = body.what.y & 7;
   float diffuse = face < 4 ? placed.diffuse[0][face] : placed.diffuse[1][face - 4];
   return point_of_body(body, placed, face_normal(placed, face), diffuse);
 }
 
 // Adds the fragment's body, which begins in its face; bodies of other instances around the ray's start began earlier.
 void enter_first(inout BodyList list) {
-  if (kPart == kShapes) return;
+  if (kStartsBefore) return;
   for (uint i = 0; i < list.count; ++i) {
     Body body = listed_body(list, i);
     if ((body.what.z & kHowItBegins) != kStartsInside || body.voxel.w != seen_home) continue;
@@ -51,6 +52,6 @@ void main() {
   // Read so that no output of the vertex shader is unused.
   vec4 nothing = min(abs(colour + viewer + vec4(texels)), vec4(0.0));
   vec3 from = place.xyz + kWithin * edges.xyz;
-  if (kPart != kShapes) from = before_face(what.x, -kWithin);
+  if (kPart != kShapes) from = before_face(what.x, kStartsBefore ? kWithin : -kWithin);
   pixel = nothing + seen_from(mesh_frame().instances[what.y].home.w, base.xyz, from);
 }

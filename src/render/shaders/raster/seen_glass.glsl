@@ -2,6 +2,7 @@
 // The including shader draws the nearest such fragment of each pixel after the opaque surfaces, and defines the step
 // (`kGlassStep`).
 #include "see_through.glsl"
+#include "looks.glsl"
 
 // The ray that continues from the fragment. It starts within the fragment's body.
 GridRay seen_ray;
@@ -31,19 +32,49 @@ float opaque_behind() {
   }
 }
 
-// Returns the point of entry on a body's face, with the occlusion that a blocky mesh would store there. `normal`: unit,
-// in the world; `diffuse`: of the sun.
-LitPoint point_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
-  uint face = body.what.y;
+// Returns the square of the distance of the image's samples where the ray enters a body, in voxels of its grid.
+float square_spacing_at(Body body, Placed placed) {
+  float spacing = frame().down.w / placed.ref_inside.w;
+  vec3 from_camera = seen_in_view.origin + frame().view_depth * frame().forward.xyz;
+  if (has(kPerspective)) spacing *= length(from_camera) + body.lengths.x;
+  return spacing * spacing;
+}
+
+// Shows the look of a face of voxels that the ray meets. `inside`: the position in the body's voxel.
+void show_look(Body body, vec3 inside, Placed placed, inout Surface surface) {
+  uint type = type_of(body);
+  bool is_mean = placed.ref_view.w != 1.0;
+  if (is_mean && show_mean_of_shapes(type, surface)) return;
+  if (!kHasCells) return;
+  uint side = is_face(body) ? body.what.y >> 3 : body.what.y;
+  show_texture(type, side, inside, is_mean ? kMeanOfFace : square_spacing_at(body, placed), surface);
+}
+
+// Returns the surface of a body where the ray enters it. From inside, only its emission is visible.
+Surface surface_entered(Body body, vec3 inside, Placed placed) {
   Surface surface = surface_of_body(body);
+  bool is_inside = (body.what.z & kStartsInside) != 0;
+  bool is_of_shape = kHasShapes && (body.what.z & kBeginsInShape) != 0;
+  bool is_of_field = kHasFieldGlass && (body.what.z & kBeginsInField) != 0;
   if (has(kDetailColours)) {
     surface.colour = placed.detail_colour.xyz;
     surface.emitted = vec3(0.0);
+  } else if (is_of_shape) {
+    show_side(body.what.y, inside, square_spacing_at(body, placed), surface);
+  } else if (!is_of_field && !is_inside) {
+    show_look(body, inside, placed, surface);
   }
-  // From inside, only its emission is visible.
-  if ((body.what.z & kStartsInside) != 0) surface.colour = vec3(0.0);
+  if (is_inside) surface.colour = vec3(0.0);
+  return surface;
+}
+
+// Returns the point of entry on a body's face, with the occlusion that a blocky mesh would store there. `normal`: unit,
+// in the world; `diffuse`: of the sun.
+LitPoint point_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
+  uint face = body.what.y & 7;
   GridRay ray = seen_ray_in(body.voxel.w, placed);
   vec3 inside = vec3(ray.base - body.voxel.xyz) + ray.origin + body.lengths.x * ray.direction;
+  Surface surface = surface_entered(body, inside, placed);
   if (kHasShapes && (body.what.z & kBeginsInShape) != 0) {
     vec3 in_grid = side_normal(body.what.y);
     vec3 above = vec3(body.voxel.xyz & 63) + inside + frame().lift / placed.ref_view.w * in_grid;
@@ -75,6 +106,13 @@ LitPoint point_of_body(Body body);
 // Adds the body that begins at the fragment as the list's first; defined by the including file.
 void enter_first(inout BodyList list);
 
+// Returns true for a face of a cell that is drawn like an opaque surface: the image behind has it.
+bool is_drawn_behind(Body body) {
+  if (!is_face(body) || (body.what.z & kIsClosed) == 0) return false;
+  uint face = face_of_cell(type_of(body), body.what.y >> 3);
+  return alpha_of(TexturedFaces(frame().textured_faces).at[face].what.z) != kTranslucent;
+}
+
 // Returns the view from a point of instance `home`, in its tree's coordinates relative to `base`: the transmittance of
 // each channel, or the light added to the image behind.
 vec4 seen_from(int home, ivec3 base, vec3 from) {
@@ -93,11 +131,14 @@ vec4 seen_from(int home, ivec3 base, vec3 from) {
     if (is_first) enter_first(list);
     state.weight.w = list.dropped_t;
     Passage way = passage_through(list, !is_first);
-    while (enter_next(way, opaque_t, state)) {
+    bool is_closed = false;
+    while (!is_closed && enter_next(way, opaque_t, state)) {
+      is_closed = is_drawn_behind(way.met);
+      if (is_closed) break;
       vec3 weight = pass_body(way, state);
       if (kGlassStep != kGlassPassed) state.colour.xyz += weight * colour_of(point_of_body(way.met));
     }
-    is_last = way.is_last;
+    is_last = way.is_last || is_closed;
   }
   return kGlassStep == kGlassPassed ? vec4(state.weight.xyz, 1.0) : vec4(shown(state.colour.xyz), 0.0);
 }

@@ -68,7 +68,7 @@ void enter_first(inout BodyList list) {
   if (list.count > 0) {
     Body first = listed_body(list, 0);
     bool is_of_kind = ((first.what.z & kBeginsInField) != 0) == is_of_field;
-    bool is_of_type = !is_of_field || first.what.x == uint(base.w);
+    bool is_of_type = !is_of_field || type_of(first) == uint(base.w);
     if (is_of_kind && is_of_type && first.voxel.w == seen_home && first.lengths.x < near) {
       first.what.z &= ~kStartsInside;
       if (is_of_field) first.what.y = packed_normal(in_grid);

@@ -119,6 +119,7 @@ struct MeshFrameData {
   bool has_smooth_glass = false;
   bool has_fields = false;          ///< among the placed content
   bool has_shapes = false;          ///< among the placed content
+  bool has_cells = false;           ///< transparent types with textures are among it
   bool has_textures = false;        ///< colours are shown, and types have textures
   bool has_type_textures = false;   ///< types have textures
   bool has_cutouts = false;         ///< quads of transparent types have textures that hide the background

@@ -356,7 +356,8 @@ Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples,
       const auto found = pipelines_->pipeline({what, step.mode, mirrored, step.over == Step::Over::GlassInOrder, faces,
                                                lit, data.glass_by_rays && is_nearest_glass(step.mode),
                                                lit != MeshLight::Plain && data.has_fields, reads_textures,
-                                               lit != MeshLight::Plain && data.has_shapes, samples});
+                                               lit != MeshLight::Plain && data.has_shapes,
+                                               lit == MeshLight::TracedThroughGlass && data.has_cells, samples});
       if (!found) return found.error();
       out = *found;
       return {};

@@ -218,8 +218,8 @@ VkPipelineColorBlendAttachmentState blend_of(const MeshWay& way) {
 
 // The two shader stages with their specialization constants.
 struct Stages {
-  std::array<VkBool32, 10> values;
-  std::array<VkSpecializationMapEntry, 10> entries;
+  std::array<VkBool32, 11> values;
+  std::array<VkSpecializationMapEntry, 11> entries;
   VkSpecializationInfo constants;
   std::array<VkPipelineShaderStageCreateInfo, 2> all{};
 
@@ -233,11 +233,12 @@ struct Stages {
                way.fields && way.light == MeshLight::TracedThroughGlass,
                way.textures,
                way.shapes,
+               way.cells,
                static_cast<VkBool32>(way.faces)},
         constants{static_cast<std::uint32_t>(entries.size()), entries.data(), sizeof values, values.data()} {
     for (std::uint32_t i = 0; i < entries.size(); ++i) {
-      // Numbers as in the shaders: 0 to 8, and 20, which is theirs alone.
-      const std::uint32_t id = i < 9 ? i : 20;
+      // Numbers as in the shaders: 0 to 9, and 20, which is theirs alone.
+      const std::uint32_t id = i < 10 ? i : 20;
       entries[i] = {id, i * static_cast<std::uint32_t>(sizeof(VkBool32)), sizeof(VkBool32)};
     }
     for (std::size_t i = 0; i < all.size(); ++i) {

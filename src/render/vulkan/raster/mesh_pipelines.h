@@ -35,6 +35,7 @@ struct MeshWay {
   bool fields = false;         ///< rays may meet fields
   bool textures = false;       ///< the textures of types are read
   bool shapes = false;         ///< rays may meet shapes
+  bool cells = false;          ///< rays may meet transparent types with textures
   std::uint32_t samples = 1;
 
   auto operator<=>(const MeshWay&) const = default;

@@ -282,6 +282,7 @@ Status VulkanMeshRenderer::Impl::put_image(const vulkan::Placement& placement, c
   data.image = vulkan::make_frame(placement, camera, request);
   data.has_fields = placement.has_fields;
   data.has_shapes = placement.has_shapes;
+  data.has_cells = placement.has_transparent && textures.has_cells();
   vulkan::ShaderFrame& frame = data.image.frame;
   frame.grids = placement.grids;
   frame.surfaces = surfaces.address;

@@ -1,9 +1,11 @@
 // Ray-traced glass: its fragments match the marched image.
 
 #include <optional>
+#include <utility>
 
 #include <glm/gtc/quaternion.hpp>
 
+#include "grid/shapes/shape_types_for_tests.h"
 #include "render/vulkan/lakeside_for_tests.h"
 #include "render/vulkan/raster/glass_yard_for_tests.h"
 #include "render/vulkan/raster/mesh_for_tests.h"
@@ -22,6 +24,7 @@ using vulkan_test::bytes_that_differ;
 using vulkan_test::glass_yard;
 using vulkan_test::glass_yard_options;
 using vulkan_test::mesh_options;
+using vulkan_test::noise_with_alpha;
 using vulkan_test::over_glass_yard;
 
 class VulkanMeshSeeThrough : public vulkan_test::VulkanMeshTest {};
@@ -103,6 +106,64 @@ TEST_F(VulkanMeshSeeThrough, MatchesCpuForUnlitAndPlainGlass) {
   options.light.occlusion_mode = OcclusionMode::Off;
   options.light.glass_surfaces = false;
   compare(glass_yard(), over_glass_yard(), options, "glass_without_surfaces");
+}
+
+// Stained glass, leaves and cells of faces, in front of each other and behind plain glass; and glass with shapes.
+// Nightly only: its shaders take a minute to compile.
+TEST_F(VulkanMeshSeeThrough, TexturesAndShapesMatchCpu) {
+  if (!is_nightly()) GTEST_SKIP() << "nightly only";
+  Scene scene;
+  const ShapeTypes types(scene.types);
+  const auto add = [&](VoxelFaces faces, VoxelShapes shapes = {}) {
+    VoxelProperties type{.visibility = Visibility::Transparent};
+    type.faces = std::move(faces);
+    type.shapes = std::move(shapes);
+    return *scene.types.add(type);
+  };
+  const VoxelFace cutout{.texture = noise_with_alpha(1, 0), .turn = 1, .alpha = FaceAlpha::Cutout};
+  const VoxelFace translucent{
+      .texture = noise_with_alpha(2, 60), .tint = {255, 180, 90}, .alpha = FaceAlpha::Translucent};
+  const VoxelType leaves = add(VoxelFaces(cutout));
+  const VoxelType stained = add(VoxelFaces(translucent));
+  const VoxelType mixed = add(VoxelFaces(cutout, VoxelFace{render_test::random_texture(16, 3)}, translucent));
+  const VoxelType pane = add(VoxelFaces(translucent), VoxelShape::box({0, 0, 7}, {16, 16, 9}));
+  const VoxelType glass = add_glass(scene, {120, 200, 230, 90}, 1.5F);
+  VoxelProperties ground;
+  ground.faces = render_test::random_faces(5);
+  Grid cubes;
+  cubes.fill_box({{-8, -1, -8}, {9, 0, 9}}, *scene.types.add(ground));
+  cubes.fill_box({{-4, 0, -4}, {-1, 3, -1}}, leaves);
+  cubes.fill_box({{1, 0, -3}, {5, 2, -1}}, stained);
+  cubes.fill_box({{-3, 0, 2}, {0, 2, 4}}, mixed);
+  cubes.fill_box({{2, 0, 1}, {4, 2, 4}}, glass);
+  cubes.set({2, 1, 2}, leaves);
+  cubes.set({-1, 0, 0}, leaves);
+  cubes.set({0, 0, 2}, stained);
+  cubes.fill_box({{-5, 0, 6}, {1, 4, 7}}, glass);
+  Grid shapes;
+  shapes.fill_box({{-8, -1, -8}, {9, 0, 9}}, types.stone);
+  for (int i = 0; i < 4; ++i) shapes.set({2 * i - 3, 0, -2}, types.stairs, {.state = static_cast<std::uint32_t>(i)});
+  shapes.fill_box({{-4, 0, 1}, {0, 2, 2}}, types.pane);
+  shapes.fill_box({{1, 0, 1}, {5, 2, 2}}, pane);
+  shapes.fill_box({{-3, 0, 4}, {1, 1, 6}}, types.water);
+  RenderOptions options = glass_yard_options(160, 120);
+  const InstanceHandle first = place(scene, std::move(cubes));
+  const Camera camera = towards({6, 5, 11}, {0, 0, 0});
+  compare(scene, camera, options, "textured_glass");
+  compare(scene, towards({-9, 4, 8}, {0, 1, 0}), options, "textured_glass_aside");
+  const Image textured = drawn(camera, mesh_options(vulkan_test::of_day(options)));
+  for (const VoxelType type : {leaves, stained, mixed, pane}) {
+    VoxelProperties plain = scene.types[type];
+    plain.faces = {};
+    scene.types.replace(type, plain);
+  }
+  const RenderedImage plain = render_test::taken(scene, camera, vulkan_test::of_day(options));
+  EXPECT_GT(bytes_that_differ(textured, plain.colour, 4), 500);
+  scene.remove_instance(first);
+  place(scene, std::move(shapes));
+  // A mesh also darkens corners inside of voxels, and by shapes.
+  options.light.occlusion_mode = OcclusionMode::Off;
+  compare(scene, towards({6, 5, 9}, {0, 0, 0}), options, "shapes_behind_glass");
 }
 
 // At seams between differently merged quads each pixel is passed once: no pixel is darker than its neighbours.
