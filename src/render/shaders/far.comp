@@ -164,7 +164,8 @@ void main() {
     if ((what.z & kIsSurfel) != 0) {
       vec4 centre = FarFaces(level.faces.xy).at[i].centre;
       vec2 halves = vec2(what.z >> kSurfelHalvesShift & 0xFFF, what.z >> (kSurfelHalvesShift + 12) & 0xFFF) / 1024.0;
-      draw_surfel(far, centre.xyz, vec2(centre.w, uintBitsToFloat(what.w)), halves + kSurfelRoom, what.z & 7, number);
+      if ((what.z & kIsPiece) == 0) halves += kSurfelRoom;
+      draw_surfel(far, centre.xyz, vec2(centre.w, uintBitsToFloat(what.w)), halves, what.z & 7, number);
       continue;
     }
     if ((level.faces.w >> what.z & 1) == 0) continue;

@@ -58,13 +58,17 @@ layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Far
   uvec2 at[];
 };
 // Voxel, and type | corner occlusion << 16 | direction << 24 | open rays << 27. Surfels come last and take three
-// elements: also their offset and slopes, as floats, their packed normal, and their shift.
+// elements. The second: their offset and slopes, as floats, and their packed normal. The third: their shift, as floats;
+// for a piece of a shape also half its sides, in units of kPieceHalves, 16 bits each, and the shape's side, as in
+// Point, plus 1.
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer VoxelFaces {
   ivec4 at[];
 };
 
 const uint kIsSurfel = 8;
 const uint kSurfelHalvesShift = 4;  // in units of 1/1,024, twelve bits each
+const uint kIsPiece = 1u << 28;     // a surfel that is a piece of a shape
+const float kPieceHalves = 1.0 / 16384.0;
 const float kSurfelRoom = 0.05;  // as in render/impostor/raster/impostor_faces.h
 
 const uint kNoFace = 0xFFFFFFFFu;

@@ -56,14 +56,6 @@ vec3 occlusion_direction(uint face, int ray, uint hash) {
   return direction;
 }
 
-// Returns the openness stored in an impostor's face.
-float openness_of_far(Point point) {
-  uint light = point.what.z >> 8;
-  if (!has(kOcclusionVertex) || is_of_field(point)) return float(light >> 8) / 9.0;
-  vec4 corners = vec4(light & 3, light >> 2 & 3, light >> 4 & 3, light >> 6 & 3);
-  return 1.0 - occlusion_at(corners, point.what.y, point.inside.xyz) / 3.0;
-}
-
 // Returns the normal of a surface point, in its grid.
 vec3 grid_normal(Point point) {
   if (is_of_shape(point)) return side_normal(point.what.y);
@@ -73,6 +65,14 @@ vec3 grid_normal(Point point) {
 uint face_of(Point point) {
   return is_of_shape(point) ? side_direction(point.what.y) : point.what.y;
 }
+// Returns the openness stored in an impostor's face.
+float openness_of_far(Point point) {
+  uint light = point.what.z >> 8;
+  if (!has(kOcclusionVertex) || is_of_field(point)) return float(light >> 8) / 9.0;
+  vec4 corners = vec4(light & 3, light >> 2 & 3, light >> 4 & 3, light >> 6 & 3);
+  return 1.0 - occlusion_at(corners, face_of(point), point.inside.xyz) / 3.0;
+}
+
 // Returns true if a surface point is not perpendicular to an axis of its grid.
 bool is_inclined(Point point) {
   return is_of_field(point) || (is_of_shape(point) && is_tilted(point.what.y));
@@ -265,7 +265,8 @@ Surface surface_at(Point point, Placed placed) {
   } else if (is_of_shape(point)) {
     float spacing = frame().down.w / placed.ref_inside.w;
     if (has(kPerspective)) spacing *= point.inside.w;
-    show_side(point.what.y, point.inside.xyz, spacing * spacing, surface);
+    bool is_mean = (point.what.z & kIsFar) != 0;
+    show_side(point.what.y, point.inside.xyz, is_mean ? kMeanOfFace : spacing * spacing, surface);
   } else if (kHasShapes && !is_of_field(point) && placed.ref_view.w != 1.0 &&
              show_mean_of_shapes(point.what.x, surface)) {
     return surface;

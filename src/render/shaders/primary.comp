@@ -38,6 +38,21 @@ vec3 place_on_surfel(ExactRay ray, Pair from_voxel, uint side, vec3 shape, vec2 
   return near + rest * d;
 }
 
+// Moves a point onto a piece of a shape's side, between its edges. `shape`: its offset and slopes. `halves`: half its
+// sides.
+vec3 on_piece(vec3 point, uint side, vec3 shape, vec2 shift, vec2 halves) {
+  const float kRim = 1e-6;
+  vec3 middle = middle_of_surfel(side, shape, shift);
+  vec2 reach = max(halves - kRim, vec2(0.0));
+  float u = clamp(point[kFaceU[side]] - middle[kFaceU[side]], -reach.x, reach.x);
+  float v = clamp(point[kFaceV[side]] - middle[kFaceV[side]], -reach.y, reach.y);
+  vec3 at = middle;
+  at[kFaceU[side]] += u;
+  at[kFaceV[side]] += v;
+  at[side >> 1] += shape.y * u + shape.z * v;
+  return at;
+}
+
 // Returns the impostor of a rectangle, by its number among all impostors' rectangles.
 Far far_with(uint number) {
   Fars fars = Fars(frame().fars);
@@ -85,8 +100,8 @@ bool find_far(Pair direction, float scale, inout Point point, out float depth, o
   index = rectangle.what.x;
   if (is_cell) index = FarCells(level.cells.xy).at[index].face[view_of(far.near, number & 3)];
   bool is_surfel = (rectangle.what.z & kIsSurfel) != 0;
-  bool is_of_field = index >= far.faces.w;
-  if (is_of_field) index = 3 * index - 2 * far.faces.w;
+  bool has_surfel = index >= far.faces.w;
+  if (has_surfel) index = 3 * index - 2 * far.faces.w;
   ivec4 face = VoxelFaces(far.faces.xy).at[index];
   uint what = uint(face.w);
   uint side = what >> 24 & 7;
@@ -99,7 +114,7 @@ bool find_far(Pair direction, float scale, inout Point point, out float depth, o
   Pair start = start_from(ray, placed, voxel);
   Pair t = Pair(vec3(0.0), vec3(0.0));
   vec3 at;
-  if (kHasFields && is_surfel) {
+  if ((kHasFields || kHasShapes) && is_surfel) {
     at = place_on_surfel(ray, start, side, intBitsToFloat(VoxelFaces(far.faces.xy).at[index + 1].xyz),
                          intBitsToFloat(VoxelFaces(far.faces.xy).at[index + 2].xy), nearest);
   } else {
@@ -113,9 +128,17 @@ bool find_far(Pair direction, float scale, inout Point point, out float depth, o
   }
   point.voxel = ivec4(voxel, i);
   point.inside.w = depth * scale + nearest;
-  if (kHasFields && is_of_field) {
+  if ((kHasFields || kHasShapes) && has_surfel) {
     ivec4 shape = VoxelFaces(far.faces.xy).at[index + 1];
-    vec2 shift = intBitsToFloat(VoxelFaces(far.faces.xy).at[index + 2].xy);
+    ivec4 piece = VoxelFaces(far.faces.xy).at[index + 2];
+    vec2 shift = intBitsToFloat(piece.xy);
+    if (kHasShapes && piece.w != 0) {
+      vec2 halves = vec2(uvec2(piece.z) >> uvec2(0, 16) & 0xFFFF) * kPieceHalves;
+      point.inside.xyz = on_piece(at, side, intBitsToFloat(shape.xyz), shift, halves);
+      uint kind = kIsShape | kSurface | kIsFar;
+      point.what = uvec4(what & 0xFFFF, uint(piece.w) - 1, kind | light << 8, floatBitsToUint(nearest));
+      return true;
+    }
     uint normal = uint(shape.w);
     float below = dot(middle_of_surfel(side, intBitsToFloat(shape.xyz), shift) - at, normal_of(normal));
     point.inside.xyz = at + (max(below, 0.0) + kSurfelLift) * normal_of(normal);
@@ -202,7 +225,7 @@ Point first_hit(vec2 at) {
   }
   // Inside a voxel the position is not used; on an impostor it is already known.
   bool is_far = (point.what.z & kIsFar) != 0;
-  if (is_of_shape(point)) {
+  if (is_of_shape(point) && !is_far) {
     point.inside.xyz = exact_place_on_shape(placed_at(point.voxel.w), direction, point.voxel.xyz, point.what.y,
                                             uintBitsToFloat(point.what.w));
   } else if (point.voxel.w >= 0 && kind_of(point) == kSurface && !is_of_field(point) && !is_far) {

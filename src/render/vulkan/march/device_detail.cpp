@@ -37,6 +37,7 @@ void DeviceDetail::look_at(const Scene& scene) {
   PendingChanges types(followed_types_, scene.types);
   PendingChanges changes(followed_scene_, scene);
   if (has_other_visibility(*types) || has_other_shapes(*types, scene.types)) clear();
+  if (has_other_shaped_types(*types, scene.types)) impostors_.clear();  // they refer to sides of shapes
   if (changes->all || !changes->grids.empty()) impostors_.follow(scene);
   const auto is_gone = [&](GridHandle handle) { return scene.grids().find(handle) == nullptr; };
   if (changes->all || std::any_of(changes->grids.begin(), changes->grids.end(), is_gone)) {
@@ -52,7 +53,7 @@ void DeviceDetail::look_at(const Scene& scene) {
   changes.commit();
 }
 
-Result<Placement> DeviceDetail::place(const DeviceScene& device, const Scene& scene, const ImageDetail& detail,
+Result<Placement> DeviceDetail::place(DeviceScene& device, const Scene& scene, const ImageDetail& detail,
                                       const Camera& camera, const RenderOptions& options, Threads threads,
                                       std::uint64_t max_bytes) {
   ++image_;
@@ -60,7 +61,7 @@ Result<Placement> DeviceDetail::place(const DeviceScene& device, const Scene& sc
   const ImpostorScreen screen(camera, options.width, options.height);
   const auto put = [&]() -> Status {
     const bool waits = options.detail.impostor_seconds == std::numeric_limits<double>::infinity();
-    const auto sent = impostors_.send(scene, detail.far, waits);
+    const auto sent = impostors_.send(scene, detail.far, waits, device.shapes());
     if (!sent) return sent.error();
     std::vector<SelectedInstance> selected = detail.selected;
     keep_whole(*sent, selected);

@@ -35,7 +35,7 @@ class DeviceDetail {
   ///
   /// Requires: `device` was updated with `scene`, which has not changed since; no commands run.
   /// Errors:   as DeviceImpostors::draw; it is then empty.
-  [[nodiscard]] Result<Placement> place(const DeviceScene& device, const Scene& scene, const ImageDetail& detail,
+  [[nodiscard]] Result<Placement> place(DeviceScene& device, const Scene& scene, const ImageDetail& detail,
                                         const Camera& camera, const RenderOptions& options, Threads threads,
                                         std::uint64_t max_bytes = kMaxBytes);
 

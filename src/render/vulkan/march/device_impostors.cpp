@@ -7,6 +7,8 @@
 #include <span>
 #include <utility>
 
+#include <glm/geometric.hpp>
+
 #include <quoin/core/assert.h>
 
 #include "core/caches.h"
@@ -20,6 +22,9 @@ constexpr std::uint32_t kFacesAGroup = 512;  // as in far.comp
 constexpr std::uint32_t kSides = ImpostorFaces::kSides;
 constexpr std::uint32_t kIsSurfel = 8;  // as in far.glsl
 constexpr std::uint32_t kSurfelHalvesShift = 4;
+constexpr std::uint32_t kIsPiece = 1U << 28;
+constexpr float kPieceHalves = 16'384.0F;
+constexpr std::uint32_t kFromBehind = 1U << 31;  // as in shapes.glsl
 
 Vec4 vec4_of(const raster::Vector& v, float w = 0.0F) {
   return {v[0], v[1], v[2], w};
@@ -47,9 +52,10 @@ std::vector<ShaderFarFace> packed(const ImpostorFaces& impostor, const ImpostorF
       continue;
     }
     face.direction = (direction - kSides / 2) | kIsSurfel;
+    if (impostor.shape_of(level.face[i]) != nullptr) face.direction |= kIsPiece;
     for (std::size_t k = 0; k < 2; ++k) {
       const float half = impostor.surfel_of(level.face[i]).half[k];
-      QUOIN_ASSERT(half >= 0.0F && half <= 1.0F, "half a side of at most one sample");
+      QUOIN_ASSERT(half >= 0.0F && half <= 1.5F, "half a side of at most one sample, or three voxels of a shape");
       face.direction |= static_cast<std::uint32_t>(std::lround(1024.0F * half)) << (kSurfelHalvesShift + 12 * k);
     }
     face.centre.w = level.slope[0][i];
@@ -65,7 +71,33 @@ std::vector<ShaderFarCell> packed(std::span<const ImpostorFaces::Cell> cells) {
   return out;
 }
 
-std::vector<ShaderVoxelFace> packed(const ImpostorFaces& impostor, std::size_t first, std::size_t count) {
+// Finds the sides that the pieces of an impostor's shapes show: for each surfel the side plus 1, or 0 for those of
+// fields. Empty without shapes.
+Result<std::vector<std::uint32_t>> sides_of(const ImpostorFaces& impostor, DeviceShapes& shapes) {
+  std::vector<std::uint32_t> sides(impostor.shapes.size());
+  const std::size_t first = impostor.faces.size() - sides.size();
+  for (std::size_t i = 0; i < sides.size(); ++i) {
+    const ImpostorFaces::ShapeSide* const shape = impostor.shape_of(first + i);
+    if (shape == nullptr) continue;
+    QUOIN_ASSERT(impostor.types.has_value() && shape->face >= 0, "the types of the shapes, and a side");
+    const VoxelType type = impostor.faces[first + i].type;
+    const auto face = static_cast<std::size_t>(shape->face);
+    const auto side = shapes.side_of(*shape->model, type, (*impostor.types)[type].shapes, face);
+    if (!side) return side.error();
+    const bool is_behind = glm::dot(impostor.surfels[i].normal, shape->model->faces[face].normal) < 0.0F;
+    sides[i] = (*side | (is_behind ? kFromBehind : 0)) + 1;
+  }
+  return sides;
+}
+
+std::int32_t packed_halves(const std::array<float, 2>& half) {
+  const auto part = [&](std::size_t k) { return static_cast<std::uint32_t>(std::lround(kPieceHalves * half.at(k))); };
+  return std::bit_cast<std::int32_t>(part(0) | part(1) << 16);
+}
+
+// `sides`: as `sides_of`.
+std::vector<ShaderVoxelFace> packed(const ImpostorFaces& impostor, std::span<const std::uint32_t> sides,
+                                    std::size_t first, std::size_t count) {
   std::vector<ShaderVoxelFace> faces;
   faces.reserve(count);
   const std::size_t voxel_faces = impostor.faces.size() - impostor.surfels.size();
@@ -79,7 +111,11 @@ std::vector<ShaderVoxelFace> packed(const ImpostorFaces& impostor, std::size_t f
       const std::array<float, 3> numbers = is_first ? std::array{surfel.offset, surfel.slope[0], surfel.slope[1]}
                                                     : std::array{surfel.shift[0], surfel.shift[1], 0.0F};
       const auto bits = [&](std::size_t k) { return std::bit_cast<std::int32_t>(numbers.at(k)); };
-      faces.push_back({{bits(0), bits(1), bits(2)}, is_first ? octahedral(surfel.normal) : 0});
+      ShaderVoxelFace& out = faces.emplace_back();
+      out = {{bits(0), bits(1), bits(2)}, is_first ? octahedral(surfel.normal) : 0};
+      if (is_first || sides.empty()) continue;
+      out.voxel.z = packed_halves(surfel.half);
+      out.what = sides[number - voxel_faces];
       continue;
     }
     const ImpostorFaces::Face& face = impostor.faces[number];
@@ -161,7 +197,7 @@ void DeviceImpostors::follow(const Scene& scene) {
   }
 }
 
-Status DeviceImpostors::begin(const std::shared_ptr<const Impostor>& impostor, Sent& sent) {
+Status DeviceImpostors::begin(const std::shared_ptr<const Impostor>& impostor, DeviceShapes& shapes, Sent& sent) {
   QUOIN_ASSERT(impostor != nullptr, "an impostor to send");
   memory_->release(sent.place);
   sent = {};
@@ -184,6 +220,9 @@ Status DeviceImpostors::begin(const std::shared_ptr<const Impostor>& impostor, S
     if (level.cells != 0) level.cells += place->address;
   }
   sent.faces = place->address + bytes;
+  auto sides = sides_of(from, shapes);
+  if (!sides) return sides.error();
+  sent.sides = std::move(*sides);
   sent.impostor = impostor;
   return {};
 }
@@ -209,7 +248,7 @@ Status DeviceImpostors::send_some(Sent& sent, std::size_t& faces_left) {
       const std::uint64_t first = sent.levels[sent.part].faces - sent.place.address;
       done = memory_->write(sent.place, std::as_bytes(std::span(some)), first + sent.at * sizeof(ShaderFarFace));
     } else {
-      const std::vector<ShaderVoxelFace> some = packed(from, sent.at, count);
+      const std::vector<ShaderVoxelFace> some = packed(from, sent.sides, sent.at, count);
       const std::uint64_t first = sent.faces - sent.place.address;
       done = memory_->write(sent.place, std::as_bytes(std::span(some)), first + sent.at * sizeof(ShaderVoxelFace));
     }
@@ -222,7 +261,8 @@ Status DeviceImpostors::send_some(Sent& sent, std::size_t& faces_left) {
   return done;
 }
 
-Status DeviceImpostors::put(const std::shared_ptr<const Impostor>& impostor, Entry& entry, std::size_t& faces_left) {
+Status DeviceImpostors::put(const std::shared_ptr<const Impostor>& impostor, DeviceShapes& shapes, Entry& entry,
+                            std::size_t& faces_left) {
   const bool is_known = entry.last_use == image_;
   entry.last_use = image_;
   if (is_known || entry.whole.impostor == impostor) return {};
@@ -235,7 +275,7 @@ Status DeviceImpostors::put(const std::shared_ptr<const Impostor>& impostor, Ent
       memory_->release(entry.whole.place);
       entry.whole = {};
     }
-    if (Status done = begin(impostor, entry.next); !done) return done;
+    if (Status done = begin(impostor, shapes, entry.next); !done) return done;
   }
   std::size_t left = faces_left;
   if (Status done = send_some(entry.next, left); !done) return done;
@@ -246,13 +286,13 @@ Status DeviceImpostors::put(const std::shared_ptr<const Impostor>& impostor, Ent
   return {};
 }
 
-Result<std::vector<FarInstance>> DeviceImpostors::send(const Scene& scene, const FarImpostors& far, bool waits) {
+Result<std::vector<FarInstance>> DeviceImpostors::send(const Scene& scene, const FarImpostors& far, bool waits,
+                                                       DeviceShapes& shapes) {
   ++image_;
   std::size_t faces_left = waits ? std::numeric_limits<std::size_t>::max() : kFacesPerImage;
   // Missing impostors come first: a constantly edited impostor would delay them forever.
   for (const bool is_first : {true, false}) {
     for (const auto& [grid, impostor] : far.kept) {
-      if (!impostor->faces().shapes.empty()) continue;
       const auto [found, is_new] = entries_.try_emplace(grid);
       Entry& entry = found->second;
       if (is_new) {
@@ -260,12 +300,12 @@ Result<std::vector<FarInstance>> DeviceImpostors::send(const Scene& scene, const
         entry.field = scene.grids()[grid].field.cursor();
       }
       if ((entry.whole.impostor == nullptr) != is_first) continue;
-      if (Status done = put(impostor, entry, faces_left); !done) return done.error();
+      if (Status done = put(impostor, shapes, entry, faces_left); !done) return done.error();
     }
   }
+  if (Status done = shapes.send(); !done) return done.error();
   std::vector<FarInstance> sent;
   for (const FarInstance& instance : far.instances) {
-    if (!instance.impostor->faces().shapes.empty()) continue;
     const Sent& whole = entries_.find(scene.instances()[instance.instance].grid)->second.whole;
     if (whole.impostor != nullptr) sent.push_back({instance.instance, whole.impostor.get()});
   }

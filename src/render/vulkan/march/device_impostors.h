@@ -17,6 +17,7 @@
 
 namespace quoin::vulkan {
 
+class DeviceShapes;
 struct Placement;
 
 /// Impostors in device memory, sent when an image first shows them and kept for later images.
@@ -30,9 +31,10 @@ class DeviceImpostors {
   explicit DeviceImpostors(DeviceMemory& memory) : memory_(&memory) {}
 
   /// Begins an image: sends impostors, and returns the far instances whose impostor is complete; the others must be
-  /// traced, as must those with shapes. `waits`: sends all. Errors: LimitExceeded when a memory is full. It must then
-  /// be cleared.
-  [[nodiscard]] Result<std::vector<FarInstance>> send(const Scene& scene, const FarImpostors& far, bool waits);
+  /// traced. `waits`: sends all. `shapes`: receives the models of their shapes; if it is cleared, this must be, too.
+  /// Errors: LimitExceeded when a memory is full. It must then be cleared.
+  [[nodiscard]] Result<std::vector<FarInstance>> send(const Scene& scene, const FarImpostors& far, bool waits,
+                                                      DeviceShapes& shapes);
 
   /// Prepares an image of `width` by `height` pixels to draw instances from their impostors: camera rays skip them,
   /// and Placement::far has their visible faces. Memory as DeviceDetail::place.
@@ -60,6 +62,7 @@ class DeviceImpostors {
     Place place;
     std::array<ShaderFarLevel, ImpostorFaces::kLevels + 1> levels{};  // last: faces that no view saw
     std::uint64_t faces = 0;                                          // address
+    std::vector<std::uint32_t> sides;                                 // of pieces of shapes: far.glsl; else empty
     std::size_t part = 0;                                             // part to send next; kParts: complete
     std::size_t at = 0;                                               // position in that part
   };
@@ -71,9 +74,10 @@ class DeviceImpostors {
     std::uint64_t last_use = 0;
   };
   void release(Entry& entry);
-  Status begin(const std::shared_ptr<const Impostor>& impostor, Sent& sent);
+  Status begin(const std::shared_ptr<const Impostor>& impostor, DeviceShapes& shapes, Sent& sent);
   Status send_some(Sent& sent, std::size_t& faces_left);
-  Status put(const std::shared_ptr<const Impostor>& impostor, Entry& entry, std::size_t& faces_left);
+  Status put(const std::shared_ptr<const Impostor>& impostor, DeviceShapes& shapes, Entry& entry,
+             std::size_t& faces_left);
   [[nodiscard]] static ShaderFar shader_far(const Sent& sent, const DrawnImpostor& drawn);
 
   DeviceMemory* memory_;

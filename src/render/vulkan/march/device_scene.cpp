@@ -59,11 +59,6 @@ std::uint32_t side_flags(const ModelFace& face, const VoxelFace* look, const Vox
   return flags;
 }
 
-bool has_other_shaped_types(const TypeChanges& changes, const VoxelRegistry& types) {
-  const auto is_other = [&](const TypeChange& change) { return change.shape_changed || types.is_shaped(change.type); };
-  return changes.all || std::ranges::any_of(changes.items_unless_all(), is_other);
-}
-
 bool can_be_traced(const Scene& scene, const Instance& instance, const SceneGrid* grid, InstanceFilter filter) {
   return grid != nullptr && passes(filter, scene, instance) && has_valid_transform(instance) &&
          is_finite(grid->pivot) && !content_bounds(*grid).empty();
@@ -100,6 +95,11 @@ PlacedGrid placed_as(const Instance& instance, const SceneGrid& grid, InstanceHa
 }
 
 }  // namespace
+
+bool has_other_shaped_types(const TypeChanges& changes, const VoxelRegistry& types) {
+  const auto is_other = [&](const TypeChange& change) { return change.shape_changed || types.is_shaped(change.type); };
+  return changes.all || std::ranges::any_of(changes.items_unless_all(), is_other);
+}
 
 std::uint32_t axes_of(const FaceTexels& face) {
   const auto axis = [&](std::size_t i) { return std::uint32_t{face.axis[i]} | (face.scale[i] < 0.0 ? 4U : 0U); };
@@ -294,13 +294,27 @@ void DeviceTextures::clear() {
 Result<ShaderShape> DeviceShapes::shape_of(const PlacedShape& shape) {
   QUOIN_ASSERT(types_ != nullptr, "the types of the shapes");
   const VoxelProperties& type = (*types_)[shape.type];
-  const auto known = models_.find({shape.model, shape.type});
-  const Result<std::uint32_t> model =
-      known != models_.end() ? Result<std::uint32_t>(known->second) : add(*shape.model, type);
+  const Result<std::uint32_t> model = index_of(*shape.model, shape.type, type.shapes);
   if (!model) return model.error();
-  if (known == models_.end()) models_[{shape.model, shape.type}] = *model;
   const std::uint32_t opaque = type.visibility == Visibility::Opaque ? kShapeIsOpaque : 0;
   return ShaderShape{shape.type | opaque, *model};
+}
+
+Result<std::uint32_t> DeviceShapes::index_of(const ShapeModel& model, VoxelType type, const VoxelShapes& owner) {
+  const auto known = models_.find({&model, type});
+  if (known != models_.end()) return known->second.first;
+  const Result<std::uint32_t> first = add(model, (*types_)[type]);
+  if (first) models_[{&model, type}] = {*first, owner};
+  return first;
+}
+
+Result<std::uint32_t> DeviceShapes::side_of(const ShapeModel& model, VoxelType type, const VoxelShapes& owner,
+                                            std::size_t face) {
+  QUOIN_ASSERT(types_ != nullptr && face < model.faces.size(), "the types of the shapes, and a side of the model");
+  const Result<std::uint32_t> first = index_of(model, type, owner);
+  if (!first) return first.error();
+  const auto sides = std::bit_cast<std::uint32_t>(vectors_[*first].y);
+  return sides + kSideVectors * static_cast<std::uint32_t>(face);
 }
 
 // Appends a model to the table. Returns its index.

@@ -140,6 +140,10 @@ class DeviceShapes final : public ShapeModels {
   /// Requires: the shaped types are those of the last call; else call `clear`.
   void use(const VoxelRegistry& types) { types_ = &types; }
   [[nodiscard]] Result<ShaderShape> shape_of(const PlacedShape& shape) override;
+  /// Returns the index of a side of a model in the table of vectors. `owner`: the shapes of the type, which have the
+  /// model. Errors: as `shape_of`.
+  [[nodiscard]] Result<std::uint32_t> side_of(const ShapeModel& model, VoxelType type, const VoxelShapes& owner,
+                                              std::size_t face);
   /// Queues the models since the last call. After an error it must be cleared.
   [[nodiscard]] Status send();
   void clear();
@@ -147,6 +151,11 @@ class DeviceShapes final : public ShapeModels {
   [[nodiscard]] std::uint64_t address() const { return place_.address; }
 
  private:
+  struct KnownModel {
+    std::uint32_t first = 0;  // of its vectors
+    VoxelShapes owner;        // keeps the model, whose address identifies it
+  };
+  [[nodiscard]] Result<std::uint32_t> index_of(const ShapeModel& model, VoxelType type, const VoxelShapes& owner);
   [[nodiscard]] Result<std::uint32_t> add(const ShapeModel& model, const VoxelProperties& type);
   void add_boxes(const ShapeModel& model);
   Status add_side(const ModelFace& face, const ShapeModel& model, const VoxelProperties& type);
@@ -154,7 +163,7 @@ class DeviceShapes final : public ShapeModels {
   ShaderMemory* memory_;
   KnownTexels* known_;
   const VoxelRegistry* types_ = nullptr;
-  std::map<std::pair<const ShapeModel*, VoxelType>, std::uint32_t> models_;
+  std::map<std::pair<const ShapeModel*, VoxelType>, KnownModel> models_;
   std::vector<Vec4> vectors_;
   std::size_t sent_ = 0;  // vectors
   Place place_;
@@ -190,6 +199,9 @@ struct DeviceLight {
   DeviceLevels levels;
 };
 
+/// Returns true if any type that has or had shapes has changed: DeviceShapes must then be cleared.
+[[nodiscard]] bool has_other_shaped_types(const TypeChanges& changes, const VoxelRegistry& types);
+
 /// A scene's voxels in device memory, and its instances.
 class DeviceScene {
  public:
@@ -210,6 +222,8 @@ class DeviceScene {
   [[nodiscard]] const std::vector<ShaderGrid>& grid_table() const { return grid_table_; }
   [[nodiscard]] std::uint64_t surfaces_address() const { return surfaces_place_.address; }
   [[nodiscard]] std::uint32_t last_surface() const { return last_surface_; }
+  /// Returns the models of shapes. Requires: a scene with shapes.
+  [[nodiscard]] DeviceShapes& shapes() { return *shapes_; }
   /// Sets the addresses of the shapes in a frame.
   void put_shapes_in(ShaderFrame& frame) const;
   /// Returns true if some opaque types do not darken corners.

@@ -11,6 +11,7 @@
 #include "grid/shapes/shape_types_for_tests.h"
 #include "render/cpu/cave_for_tests.h"
 #include "render/vulkan/device/vulkan_for_tests.h"
+#include "render/vulkan/march/renderer_impl.h"
 
 namespace quoin {
 namespace {
@@ -191,6 +192,37 @@ TEST_F(VulkanShapes, HalvedShapesMatchCpu) {
   const RenderedImage blue = render_test::taken(garden.scene, camera, vulkan_test::of_day(options));
   EXPECT_GT(vulkan_test::differences(halved, blue).pixels, 50);
   compare(garden.scene, camera, options, "halved_blue");
+}
+
+// Impostors show sides of shapes in the means of their textures.
+TEST_F(VulkanShapes, ImpostorsOfShapesMatchCpu) {
+  Garden garden(false);
+  garden.add_turned({-3.0, 12.5, 2.0});
+  const vulkan::DeviceDetail& detail = renderer_->impl().detail;
+  RenderOptions options = sized(128, 96);
+  const Camera camera = towards({40, 30, 60}, {0, 1, 0}, 0.4);
+  const RenderedImage whole = render_test::taken(garden.scene, camera, vulkan_test::of_day(options));
+  options.detail.policy = DetailPolicy{.far_pixels = 1000};
+  compare(garden.scene, camera, options, "impostors");
+  EXPECT_GT(detail.impostor_bytes(), 0U);
+  const RenderedImage far = taken_as_is(camera, vulkan_test::of_day(options));
+  EXPECT_GT(vulkan_test::differences(far, whole).pixels, 50);
+  compare(garden.scene, towards({200, 150, 300}, {0, 1, 0}, 0.1), options, "impostors_cells");
+  options.light.occlusion_mode = OcclusionMode::Vertex;
+  compare(garden.scene, camera, options, "impostors_vertex");
+  options.light.shading = Shading::Normals;
+  compare(garden.scene, camera, options, "impostors_normals");
+  // Edits of voxels and of types.
+  options.light.shading = Shading::Lit;
+  garden.scene.edit(garden.grid).grid.set({2, 0, -5}, kAir);
+  compare(garden.scene, camera, options, "impostors_edited");
+  VoxelProperties slab = garden.scene.types[garden.types.slab];
+  slab.emission = 0.7F;
+  garden.scene.types.replace(garden.types.slab, slab);
+  compare(garden.scene, camera, options, "impostors_other_type");
+  slab.shapes = VoxelShape::box({2, 0, 2}, {14, 12, 14});
+  garden.scene.types.replace(garden.types.slab, slab);
+  compare(garden.scene, camera, options, "impostors_other_shape");
 }
 
 // Blocks of leaves, stained glass, and cells with faces of all kinds.
