@@ -243,7 +243,7 @@ void show_texture(Point point, Placed placed, inout Surface surface) {
   bool is_cell = kHasCells && (point.what.z & kIsCell) != 0;
   if (is_cell) {
     face = point.what.z >> 8 & 7;
-  } else if (!is_mean) {
+  } else {
     turn_by_state(point.what.x, point.voxel.xyz, placed, face, inside);
   }
   show_texture(point.what.x, face, inside, is_mean ? kMeanOfFace : spacing * spacing, surface);

@@ -99,7 +99,7 @@ Status DeviceDetail::put_halved(const DeviceScene& device, const Scene& scene,
     const CoarseLevel* found = coarse.find(grid, choice.level);
     if (found == nullptr) continue;
     const Level* level = nullptr;
-    if (Status done = put_level(*found, grid, table, level); !done) return done;
+    if (Status done = put_level(*found, grid, scene.types, table, level); !done) return done;
     placement.has_transparent |= level->voxels.has_transparent();  // shapes are cubes there
     put_in(*found, scene.grids()[grid], level->voxels, level->index, *next);
     halved.push_back(
@@ -115,14 +115,15 @@ Status DeviceDetail::put_halved(const DeviceScene& device, const Scene& scene,
 }
 
 // Updates a level and adds it to the table, once per image.
-Status DeviceDetail::put_level(const CoarseLevel& coarse, GridHandle grid, std::vector<ShaderGrid>& table,
-                               const Level*& level) {
+Status DeviceDetail::put_level(const CoarseLevel& coarse, GridHandle grid, const VoxelRegistry& types,
+                               std::vector<ShaderGrid>& table, const Level*& level) {
   Level& known = levels_[{grid, coarse.level}];
   level = &known;
   if (known.last_use == image_) return {};
   const TreeCache& trees = coarse.trees;
-  Status done = known.voxels.update(
-      *memory_, {coarse.voxels, &trees.opaque(), trees.transparent(), trees.opaque_field(), trees.glass()});
+  const VoxelRegistry* const turned = types.has_turned_by_state() ? &types : nullptr;
+  Status done = known.voxels.update(*memory_, {coarse.voxels, &trees.opaque(), trees.transparent(),
+                                               trees.opaque_field(), trees.glass(), nullptr, nullptr, turned});
   known.last_use = image_;
   known.index = static_cast<std::int32_t>(table.size());
   table.push_back(known.voxels.shader_grid());

@@ -56,7 +56,8 @@ class DeviceDetail {
   };
   Status put_halved(const DeviceScene& device, const Scene& scene, std::span<const SelectedInstance> selected,
                     Threads threads, Placement& placement);
-  Status put_level(const CoarseLevel& coarse, GridHandle grid, std::vector<ShaderGrid>& table, const Level*& level);
+  Status put_level(const CoarseLevel& coarse, GridHandle grid, const VoxelRegistry& types,
+                   std::vector<ShaderGrid>& table, const Level*& level);
   void drop_unused(std::uint64_t max_bytes);
 
   DeviceMemory* memory_;

@@ -361,6 +361,17 @@ TEST_F(VulkanTextures, CubesTurnedByStateMatchCpu) {
   scene.edit(grid).grid.set_data({2, 0, 0}, {.state = 0});
   scene.edit(grid).grid.set_data({2, -1, 2}, {.state = 1});
   compare_marched(scene, camera, options, "turned_after_edits");
+  // Halved grids and impostors show the means of the turned faces.
+  Grid& below = scene.edit(grid).grid;
+  below.fill_box({{-16, -16, -16}, {16, -2, 16}}, fallen);
+  for (int i = 0; i < 16 * 32; ++i) below.set_data({i % 16, -3, i / 16 - 16}, {.state = 1});
+  const Camera distant = towards({60, 45, 80}, {0, 0, 0}, 0.6);
+  RenderOptions halved = options;
+  halved.detail.policy =
+      DetailPolicy{.rule = DetailPolicy::Rule::ByPixels, .voxel_pixels = 1e6, .cell_pixels = 12, .far_pixels = 0};
+  compare_marched(scene, distant, halved, "turned_halved");
+  halved.detail.policy = DetailPolicy{.far_pixels = 1000};
+  compare_marched(scene, distant, halved, "turned_impostor");
 }
 
 // Renderers and their mesh renderers share the texels in device memory.
