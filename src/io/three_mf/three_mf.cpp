@@ -30,7 +30,7 @@
 #include "core/srgb.h"
 #include "io/format_driver.h"
 #include "io/mesh_parts.h"
-#include "io/three_mf/zip.h"
+#include "io/zip.h"
 #include "io/triangles/triangles.h"
 
 #ifdef QUOIN_HAVE_EXPAT

@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <span>
@@ -45,30 +47,36 @@ class ZipFile {
   std::unique_ptr<Deflater> deflater_;
 };
 
-/// The files in a zip file, stored or compressed by deflate, found by the directory at its end.
+/// The files in a zip file, stored or compressed by deflate, found by the directory at its end; zip64 too.
 /// Source: PKWARE, ".ZIP File Format Specification" 6.3.3. Lifetime: the bytes.
 class ZipParts {
  public:
-  /// Errors: BadFormat, with the offset; Unsupported for zip64 and files in several parts.
+  /// Errors: BadFormat, with the offset; Unsupported for files in several parts.
   [[nodiscard]] static Result<ZipParts> open(std::span<const std::byte> zip);
 
   /// The names as stored in the directory.
   [[nodiscard]] std::vector<std::string> names() const;
-  [[nodiscard]] bool has(const std::string& name) const { return entries_.contains(name); }
+  [[nodiscard]] bool has(std::string_view name) const { return entries_.contains(name); }
   /// Returns a file's content. Memory: its size, which is limited by its compressed bytes.
-  /// Errors: BadFormat; Unsupported for other compressions and for encrypted files. Requires: has(name).
-  [[nodiscard]] Result<std::vector<std::byte>> read(const std::string& name) const;
+  /// Errors: BadFormat, also for a wrong checksum; Unsupported for other compressions and for encrypted files;
+  ///         LimitExceeded if it expands to more than `max_bytes`, before it is expanded. Requires: has(name).
+  [[nodiscard]] Result<std::vector<std::byte>> read(
+      std::string_view name, std::uint64_t max_bytes = std::numeric_limits<std::uint64_t>::max()) const;
 
  private:
   struct Entry {
     std::uint32_t flags = 0;
     std::uint32_t method = 0;
-    std::uint32_t packed = 0;
-    std::uint32_t size = 0;
-    std::uint32_t at = 0;
+    std::uint32_t crc = 0;
+    std::uint64_t packed = 0;
+    std::uint64_t size = 0;
+    std::uint64_t at = 0;
   };
+  struct Directory;
+  [[nodiscard]] static Result<Directory> find_directory(std::span<const std::byte> zip);
+
   std::span<const std::byte> bytes_;
-  std::map<std::string, Entry> entries_;
+  std::map<std::string, Entry, std::less<>> entries_;
 };
 
 }  // namespace quoin

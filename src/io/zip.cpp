@@ -1,7 +1,8 @@
-#include "io/three_mf/zip.h"
+#include "io/zip.h"
 
 #include <algorithm>
 #include <array>
+#include <initializer_list>
 #include <optional>
 #include <utility>
 
@@ -153,9 +154,14 @@ namespace {
 constexpr std::uint32_t kEndOfDirectory = 0x06054B50;
 constexpr std::uint32_t kOfDirectory = 0x02014B50;
 constexpr std::uint32_t kOfFile = 0x04034B50;
+constexpr std::uint32_t kEndOfDirectory64 = 0x06064B50;
+constexpr std::uint32_t kLocator64 = 0x07064B50;
 constexpr std::size_t kEndBytes = 22;
+constexpr std::size_t kLocator64Bytes = 20;
 constexpr std::size_t kLongestComment = 65'535;
-constexpr std::uint32_t kZip64 = 0xFFFFFFFF;
+// Fields that do not fit have these values, and zip64 records have the numbers.
+constexpr std::uint64_t kInZip64 = 0xFFFFFFFF;
+constexpr std::size_t kCountInZip64 = 0xFFFF;
 
 /// Returns the offset of the record that ends the directory, before a comment.
 std::optional<std::size_t> find_end(std::span<const std::byte> zip) {
@@ -168,39 +174,89 @@ std::optional<std::size_t> find_end(std::span<const std::byte> zip) {
   return std::nullopt;
 }
 
+/// Replaces the fields of an entry that its zip64 record has. Returns false if the record lacks one.
+bool read_zip64(std::span<const std::byte> extra, std::initializer_list<std::uint64_t*> fields) {
+  constexpr std::uint16_t kZip64Record = 1;
+  ByteReader records(extra);
+  while (records.remaining() >= 4) {
+    const bool is_zip64 = records.u16() == kZip64Record;
+    ByteReader record(records.take(records.u16()));
+    if (!is_zip64) continue;
+    for (std::uint64_t* const field : fields) {
+      if (*field == kInZip64) *field = record.u64();
+    }
+    return !record.failed();
+  }
+  return std::ranges::none_of(fields, [](const std::uint64_t* field) { return *field == kInZip64; });
+}
+
 }  // namespace
 
-Result<ZipParts> ZipParts::open(std::span<const std::byte> zip) {
+struct ZipParts::Directory {
+  std::uint64_t count = 0;
+  std::uint64_t begin = 0;
+  std::uint64_t end = 0;
+};
+
+Result<ZipParts::Directory> ZipParts::find_directory(std::span<const std::byte> zip) {
   const auto end_at = find_end(zip);
   if (!end_at) return bad_at(zip.size(), "the zip file has no directory: it is cut off");
   ByteReader end(zip, *end_at + 10, zip.size());
-  const std::size_t count = end.u16();
-  const std::size_t size = end.u32();
-  const std::size_t begin = end.u32();
-  if (begin == kZip64 || count == 0xFFFF) {
-    return make_error(ErrorCode::Unsupported, "zip64 is not supported", {}, *end_at);
+  Directory directory;
+  directory.count = end.u16();
+  std::uint64_t size = end.u32();
+  directory.begin = end.u32();
+  directory.end = *end_at;
+  if ((directory.count == kCountInZip64 || size == kInZip64 || directory.begin == kInZip64) &&
+      *end_at >= kLocator64Bytes) {
+    ByteReader locator(zip, *end_at - kLocator64Bytes, *end_at);
+    const bool has_locator = locator.u32() == kLocator64;
+    (void)locator.take(4);
+    const std::uint64_t at = locator.u64();
+    if (has_locator) {
+      if (at > *end_at) return bad_at(*end_at, "the zip64 directory is outside the file");
+      ByteReader end64(zip, static_cast<std::size_t>(at), *end_at);
+      const bool is_end = end64.u32() == kEndOfDirectory64;
+      (void)end64.take(28);
+      directory.count = end64.u64();
+      size = end64.u64();
+      directory.begin = end64.u64();
+      if (!is_end || end64.failed()) return bad_at(at, "the zip64 directory is damaged");
+      directory.end = at;
+    }
   }
-  if (begin > *end_at || size > *end_at - begin) return bad_at(*end_at, "the zip directory is outside the file");
+  if (directory.begin > directory.end || size > directory.end - directory.begin) {
+    return bad_at(*end_at, "the zip directory is outside the file");
+  }
+  return directory;
+}
+
+Result<ZipParts> ZipParts::open(std::span<const std::byte> zip) {
+  const auto directory = find_directory(zip);
+  if (!directory) return directory.error();
   ZipParts parts;
   parts.bytes_ = zip;
-  ByteReader reader(zip, begin, *end_at);
-  for (std::size_t i = 0; i < count; ++i) {
+  ByteReader reader(zip, static_cast<std::size_t>(directory->begin), static_cast<std::size_t>(directory->end));
+  for (std::uint64_t i = 0; i < directory->count; ++i) {
     const std::size_t at = reader.position();
     const bool is_entry = reader.u32() == kOfDirectory;
     Entry entry;
     (void)reader.take(4);  // versions
     entry.flags = reader.u16();
     entry.method = reader.u16();
-    (void)reader.take(8);  // time, checksum
+    (void)reader.take(4);  // time
+    entry.crc = reader.u32();
     entry.packed = reader.u32();
     entry.size = reader.u32();
     const std::size_t name = reader.u16();
-    const std::size_t rest = std::size_t{reader.u16()} + reader.u16();
+    const std::size_t extra = reader.u16();
+    const std::size_t comment = reader.u16();
     (void)reader.take(8);  // disk, attributes
     entry.at = reader.u32();
     std::string text(reader.text(name));
-    (void)reader.take(rest);
-    if (!is_entry || reader.failed()) return bad_at(at, "the zip directory is damaged");
+    const bool is_whole = read_zip64(reader.take(extra), {&entry.size, &entry.packed, &entry.at});
+    (void)reader.take(comment);
+    if (!is_entry || !is_whole || reader.failed()) return bad_at(at, "the zip directory is damaged");
     parts.entries_[std::move(text)] = entry;
   }
   return parts;
@@ -213,7 +269,7 @@ std::vector<std::string> ZipParts::names() const {
   return names;
 }
 
-Result<std::vector<std::byte>> ZipParts::read(const std::string& name) const {
+Result<std::vector<std::byte>> ZipParts::read(std::string_view name, std::uint64_t max_bytes) const {
   QUOIN_ASSERT(has(name), "a file of the zip file");
   const Entry& entry = entries_.find(name)->second;
   constexpr std::uint32_t kEncrypted = 1;
@@ -222,19 +278,30 @@ Result<std::vector<std::byte>> ZipParts::read(const std::string& name) const {
     return make_error(ErrorCode::Unsupported, printable(name) + " is encrypted or not compressed by deflate", {},
                       entry.at);
   }
-  ByteReader head(bytes_, std::min<std::size_t>(entry.at, bytes_.size()), bytes_.size());
+  if (entry.size > max_bytes) {
+    return make_error(ErrorCode::LimitExceeded,
+                      printable(name) + " has " + std::to_string(entry.size) + " bytes: at most " +
+                          std::to_string(max_bytes) + " are read",
+                      {}, entry.at);
+  }
+  const auto begin = static_cast<std::size_t>(std::min<std::uint64_t>(entry.at, bytes_.size()));
+  ByteReader head(bytes_, begin, bytes_.size());
   const bool is_file = head.u32() == kOfFile;
   (void)head.take(22);
   const std::size_t names_and_more = std::size_t{head.u16()} + head.u16();
   (void)head.take(names_and_more);
-  const auto packed = head.take(entry.packed);
+  const auto packed = head.take(static_cast<std::size_t>(entry.packed));
   if (!is_file || head.failed()) return bad_at(entry.at, printable(name) + " is outside the zip file");
   ByteStream stream(packed, 0, entry.method == kDeflate ? Compression::Deflate : Compression::None);
   if (entry.size > stream.max_bytes())
     return bad_at(entry.at, printable(name) + " claims more bytes than it can expand to");
-  std::vector<std::byte> content(entry.size);
+  std::vector<std::byte> content(static_cast<std::size_t>(entry.size));
   const auto read = stream.read(content);
   if (!read || *read != content.size()) return bad_at(entry.at, printable(name) + " is damaged");
+  const auto* const bytes = reinterpret_cast<const Bytef*>(content.data());
+  if (static_cast<std::uint32_t>(crc32_z(0, bytes, content.size())) != entry.crc) {
+    return bad_at(entry.at, printable(name) + " is damaged: its checksum is wrong");
+  }
   return content;
 }
 

@@ -1,0 +1,162 @@
+#include "io/packs/pack_files.h"
+
+#include <algorithm>
+#include <cstring>
+#include <ranges>
+#include <system_error>
+
+#include <quoin/core/assert.h>
+#include <quoin/io/file.h>
+
+#include "core/bytes/files.h"
+#include "core/bytes/text.h"
+#include "io/zip.h"
+
+namespace quoin::packs {
+
+namespace {
+
+namespace fs = std::filesystem;
+using FileBytes = std::optional<std::vector<std::byte>>;
+
+constexpr std::size_t kMaxZipBytes = std::size_t{2} << 30;
+
+Error too_large(std::string_view path, std::uint64_t size, std::size_t most) {
+  return make_error(ErrorCode::LimitExceeded, printable(path) + " has " + std::to_string(size) + " bytes: at most " +
+                                                  std::to_string(most) + " are read");
+}
+
+class FolderPack final : public PackFiles {
+ public:
+  explicit FolderPack(fs::path folder) : folder_(std::move(folder)) {}
+
+  [[nodiscard]] Result<FileBytes> read(std::string_view path, std::size_t max_bytes) const override {
+    if (!is_pack_path(path)) return FileBytes();
+    const fs::path file = folder_ / fs::path(path);
+    std::error_code error;
+    if (!fs::is_regular_file(file, error)) return FileBytes();
+    // One byte more shows a file that is too large, also if it grows.
+    auto bytes = read_file_beginning(file, max_bytes + 1);
+    if (!bytes) return bytes.error();
+    if (bytes->size() > max_bytes) return too_large(path, fs::file_size(file, error), max_bytes);
+    return FileBytes(std::move(*bytes));
+  }
+
+ private:
+  fs::path folder_;
+};
+
+class ZipPack final : public PackFiles {
+ public:
+  static Result<std::shared_ptr<const PackFiles>> open(std::vector<std::byte> bytes) {
+    const std::shared_ptr<ZipPack> pack(new ZipPack(std::move(bytes)));
+    auto parts = ZipParts::open(pack->bytes_);
+    if (!parts) return parts.error();
+    pack->parts_ = std::move(*parts);
+    const auto prefix = prefix_of(pack->parts_.names());
+    if (!prefix) {
+      return make_error(ErrorCode::InvalidArgument, "not a resource pack: the zip file has no folder assets");
+    }
+    pack->prefix_ = *prefix;
+    return std::shared_ptr<const PackFiles>(pack);
+  }
+
+  [[nodiscard]] Result<FileBytes> read(std::string_view path, std::size_t max_bytes) const override {
+    if (!is_pack_path(path)) return FileBytes();
+    const std::string name = prefix_ + std::string(path);
+    if (!parts_.has(name)) return FileBytes();
+    auto bytes = parts_.read(name, max_bytes);
+    if (!bytes) return bytes.error();
+    return FileBytes(std::move(*bytes));
+  }
+
+ private:
+  explicit ZipPack(std::vector<std::byte> bytes) : bytes_(std::move(bytes)) {}
+
+  /// Returns the folder that holds `assets`: "" or "NAME/"; nullopt if there is none.
+  static std::optional<std::string> prefix_of(const std::vector<std::string>& names) {
+    std::optional<std::string> found;
+    for (const std::string& name : names) {
+      if (name.starts_with("assets/")) return "";
+      const std::size_t slash = name.find('/');
+      if (found || slash == std::string::npos) continue;
+      if (std::string_view(name).substr(slash + 1).starts_with("assets/")) found = name.substr(0, slash + 1);
+    }
+    return found;
+  }
+
+  std::vector<std::byte> bytes_;
+  ZipParts parts_;
+  std::string prefix_;
+};
+
+}  // namespace
+
+bool is_pack_path(std::string_view path) {
+  constexpr std::size_t kMaxPath = 512;
+  const auto is_plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
+           c == '-' || c == '/';
+  };
+  if (path.empty() || path.size() > kMaxPath || !std::ranges::all_of(path, is_plain)) return false;
+  for (const auto part : std::views::split(path, '/')) {
+    const std::string_view name(part.begin(), part.end());
+    if (name.empty() || name == "." || name == "..") return false;
+  }
+  return true;
+}
+
+Result<std::shared_ptr<const PackFiles>> open_pack(const fs::path& path) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) {
+    if (!fs::is_directory(path / "assets", error)) {
+      return make_error(ErrorCode::InvalidArgument, "not a resource pack: the folder has no folder assets",
+                        path.string());
+    }
+    return std::shared_ptr<const PackFiles>(std::make_shared<FolderPack>(path));
+  }
+  const std::uint64_t size = fs::file_size(path, error);
+  if (!error && size > kMaxZipBytes) return too_large(path.string(), size, kMaxZipBytes);
+  auto bytes = read_file(path);
+  if (!bytes) return bytes.error();
+  return with_path(ZipPack::open(std::move(*bytes)), path);
+}
+
+Result<std::shared_ptr<const PackFiles>> open_pack(std::vector<std::byte> zip) {
+  return ZipPack::open(std::move(zip));
+}
+
+void MemoryPack::put(std::string_view path, std::string content) {
+  QUOIN_ASSERT(is_pack_path(path), "a pack path");
+  files_.insert_or_assign(std::string(path), std::move(content));
+}
+
+Result<FileBytes> MemoryPack::read(std::string_view path, std::size_t max_bytes) const {
+  const auto found = files_.find(path);
+  if (found == files_.end() || !is_pack_path(path)) return FileBytes();
+  const std::string& content = found->second;
+  if (content.size() > max_bytes) return too_large(path, content.size(), max_bytes);
+  std::vector<std::byte> bytes(content.size());
+  if (!content.empty()) std::memcpy(bytes.data(), content.data(), content.size());
+  return FileBytes(std::move(bytes));
+}
+
+Result<std::shared_ptr<const PackStack>> PackStack::open(std::span<const fs::path> paths) {
+  std::vector<std::shared_ptr<const PackFiles>> packs;
+  for (const fs::path& path : paths) {
+    auto pack = open_pack(path);
+    if (!pack) return pack.error();
+    packs.push_back(std::move(*pack));
+  }
+  return std::make_shared<const PackStack>(std::move(packs));
+}
+
+Result<FileBytes> PackStack::read(std::string_view path, std::size_t max_bytes) const {
+  for (const auto& pack : std::views::reverse(packs_)) {
+    auto bytes = pack->read(path, max_bytes);
+    if (!bytes || *bytes) return bytes;
+  }
+  return FileBytes();
+}
+
+}  // namespace quoin::packs
