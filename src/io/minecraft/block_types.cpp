@@ -152,12 +152,12 @@ std::optional<BlockText> parse_block(std::string_view text) {
   return block;
 }
 
-BlockText block_text(const VoxelProperties& type, std::uint32_t state) {
+std::vector<StateField> state_fields(const VoxelProperties& type) {
+  std::vector<StateField> fields;
   const auto layout = type.attributes.find(kStatesAttribute);
-  auto parsed = layout != type.attributes.end() ? parse_block(type.name) : std::nullopt;
-  if (!parsed) return {type.name, {}};
-  BlockText block = std::move(*parsed);
+  if (layout == type.attributes.end()) return fields;
   std::string_view rest = layout->second;
+  int first_bit = 0;
   while (!rest.empty()) {
     const std::size_t comma = rest.find(',');
     const std::string_view one = rest.substr(0, comma);
@@ -165,10 +165,37 @@ BlockText block_text(const VoxelProperties& type, std::uint32_t state) {
     const std::size_t colon = one.find(':');
     if (colon == std::string_view::npos || colon + 2 >= one.size()) break;  // written by another program
     const auto bits = number_of(one.substr(colon + 2));
-    if (!bits) break;
-    const std::string_view key = one.substr(0, colon);
-    block.properties.emplace_back(key, value_of(key, state & ((1U << *bits) - 1U), one[colon + 1]));
-    state >>= *bits;
+    if (!bits || *bits == 0 || first_bit + static_cast<int>(*bits) > kMaxStateBits) break;
+    fields.push_back({std::string(one.substr(0, colon)), one[colon + 1], first_bit, static_cast<int>(*bits)});
+    first_bit += static_cast<int>(*bits);
+  }
+  return fields;
+}
+
+std::optional<std::uint32_t> code_of_value(const StateField& field, std::string_view value) {
+  const auto code = coded({field.key, std::string(value)});
+  if (!code || code->kind != field.kind || code->code >> field.bits != 0) return std::nullopt;
+  return code->code;
+}
+
+std::string value_of_code(const StateField& field, std::uint32_t code) {
+  QUOIN_ASSERT(std::uint64_t{code} >> field.bits == 0, "a code of the field");
+  return value_of(field.key, code, field.kind);
+}
+
+std::string_view commonest_value(std::string_view key) {
+  const Words* const words = words_of(key);
+  return words == nullptr ? std::string_view() : words->values.front();
+}
+
+BlockText block_text(const VoxelProperties& type, std::uint32_t state) {
+  const bool is_block = type.attributes.contains(kStatesAttribute);
+  auto parsed = is_block ? parse_block(type.name) : std::nullopt;
+  if (!parsed) return {type.name, {}};
+  BlockText block = std::move(*parsed);
+  for (const StateField& field : state_fields(type)) {
+    const auto mask = static_cast<std::uint32_t>((std::uint64_t{1} << field.bits) - 1U);
+    block.properties.emplace_back(field.key, value_of_code(field, state >> field.first_bit & mask));
   }
   std::ranges::sort(block.properties);
   return block;
@@ -263,6 +290,10 @@ Result<VoxelType> BlockTypes::tinted(const Block& block, const BiomeTints& tints
   VoxelProperties type = tinted_[block.number];
   type.colour = tinted_colour(type.colour, colour);
   constexpr std::array kNames = {"", "grass", "foliage", "water"};
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string digits;
+  for (int shift = 20; shift >= 0; shift -= 4) digits += kDigits[colour >> shift & 0xFU];
+  type.attributes[kTintColourAttribute] = digits;
   type.attributes[kTintAttribute] = kNames[static_cast<std::size_t>(block.tint)];
   auto added = types_.find_or_add(type);
   if (added) tinted_types_[key] = *added;

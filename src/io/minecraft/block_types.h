@@ -28,8 +28,10 @@ using Property = std::pair<std::string, std::string>;
 inline constexpr const char* kStatesAttribute = "minecraft.states";
 /// The attribute of a type with a guessed look: "words" or "nothing".
 inline constexpr const char* kGuessAttribute = "minecraft.look";
-/// The attribute with the tint of a biome-coloured type.
+/// The attribute with the tint of a biome-coloured type: "grass", "foliage" or "water".
 inline constexpr const char* kTintAttribute = "minecraft.tint";
+/// The attribute with the biome's colour of that tint: "91bd59".
+inline constexpr const char* kTintColourAttribute = "minecraft.tint_colour";
 
 /// A block as a type and a state.
 struct BlockState {
@@ -53,6 +55,22 @@ struct BlockText {
   std::vector<Property> properties;
 };
 [[nodiscard]] BlockText block_text(const VoxelProperties& type, std::uint32_t state);
+/// A field of a type's state bits, in the order of kStatesAttribute.
+struct StateField {
+  std::string key;
+  char kind = 'w';  ///< 'w': a word, 'b': true or false, 'n': a number
+  int first_bit = 0;
+  int bits = 0;
+};
+/// Returns the fields of a type; none for types of other formats.
+[[nodiscard]] std::vector<StateField> state_fields(const VoxelProperties& type);
+/// Returns a value as the bits of a field; nullopt if it has no code.
+[[nodiscard]] std::optional<std::uint32_t> code_of_value(const StateField& field, std::string_view value);
+/// Returns the value of a code of a field. Requires: the code fits into the field.
+[[nodiscard]] std::string value_of_code(const StateField& field, std::uint32_t code);
+/// Returns the commonest value of a property with words ("axis": "y"); empty for other properties.
+[[nodiscard]] std::string_view commonest_value(std::string_view key);
+
 /// "minecraft:oak_stairs[facing=east,half=top]".
 [[nodiscard]] std::string to_string(const BlockText& block);
 /// Parses such a text; nullopt if brackets or equals signs are missing.

@@ -1,0 +1,265 @@
+#include "io/packs/block_models.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+#include <quoin/core/assert.h>
+
+#include "core/bytes/bytes.h"
+#include "core/bytes/text.h"
+
+namespace quoin::packs {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int kMaxJsonDepth = 64;
+constexpr int kMaxReferences = 32;
+constexpr float kMaxPart = 1'024.0F;  // of textures, in sixteenths: the limit of shapes
+
+/// An error of a file, made where the fault is found; callers add the file.
+Error wrong_model(const std::string& reason) {
+  return make_error(ErrorCode::BadFormat, reason);
+}
+
+std::string text_in(const Json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_string() ? found->get<std::string>() : std::string();
+}
+
+/// Reads an array of finite numbers from `least` to `most`. Returns false if it is none.
+template <std::size_t kCount>
+bool read_numbers(const Json& json, float least, float most, std::array<float, kCount>& out) {
+  if (!json.is_array() || json.size() != kCount) return false;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    if (!json[i].is_number()) return false;
+    const double number = json[i].get<double>();
+    if (!(number >= double{least} && number <= double{most})) return false;
+    out[i] = static_cast<float>(number);
+  }
+  return true;
+}
+
+/// Reads a point. Errors: BadFormat, naming the key.
+Result<Vec3> point_in(const Json& object, const char* key, float least, float most) {
+  const auto found = object.find(key);
+  std::array<float, 3> numbers{};
+  if (found == object.end() || !read_numbers(*found, least, most, numbers)) {
+    return wrong_model(std::string("\"") + key + "\" is not three numbers from " + to_text(least) + " to " +
+                       to_text(most));
+  }
+  return Vec3(numbers[0], numbers[1], numbers[2]);
+}
+
+/// Returns the turn by angles about x, y and z; nullopt if there is none. Errors: BadFormat.
+Result<std::optional<ElementTurn>> turn_of(const Json& json) {
+  if (!json.is_object()) return wrong_model("\"rotation\" is not an object");
+  ElementTurn turn;
+  if (json.contains("origin")) {
+    const auto origin = point_in(json, "origin", -kMaxPart, kMaxPart);
+    if (!origin) return origin.error();
+    turn.origin = *origin;
+  }
+  const auto rescale = json.find("rescale");
+  turn.rescales = rescale != json.end() && rescale->is_boolean() && rescale->get<bool>();
+  constexpr std::array<const char*, 3> kAxes = {"x", "y", "z"};
+  const std::string axis = text_in(json, "axis");
+  int turns = 0;
+  for (int i = 0; i < 3; ++i) {
+    const char* const name = kAxes[static_cast<std::size_t>(i)];
+    const auto angle = json.find(axis.empty() ? name : "angle");
+    if (angle == json.end() || (!axis.empty() && axis != name)) continue;
+    if (!angle->is_number() || !(std::abs(angle->get<double>()) <= 360.0)) {
+      return wrong_model("the angle of \"rotation\" is not a number from -360 to 360");
+    }
+    if (angle->get<double>() == 0.0) continue;
+    turn.axis = i;
+    turn.degrees = static_cast<float>(angle->get<double>());
+    ++turns;
+  }
+  if (!axis.empty() && axis != "x" && axis != "y" && axis != "z") {
+    return wrong_model("the axis of \"rotation\" is not x, y or z");
+  }
+  if (turns > 1) return make_error(ErrorCode::Unsupported, "an element is turned about more than one axis");
+  return turns == 0 ? std::optional<ElementTurn>() : std::optional(turn);
+}
+
+Result<PackFace> face_of(const Json& json) {
+  if (!json.is_object()) return wrong_model("a face is not an object");
+  PackFace face;
+  face.texture = text_in(json, "texture");
+  if (const auto uv = json.find("uv"); uv != json.end()) {
+    std::array<float, 4> part{};
+    if (!read_numbers(*uv, -kMaxPart, kMaxPart, part)) return wrong_model("\"uv\" is not four numbers");
+    face.uv = part;
+  }
+  if (const auto turn = json.find("rotation"); turn != json.end()) {
+    const double degrees = turn->is_number() ? turn->get<double>() : -1.0;
+    if (degrees != 0.0 && degrees != 90.0 && degrees != 180.0 && degrees != 270.0) {
+      return wrong_model("the rotation of a face is not 0, 90, 180 or 270");
+    }
+    face.turn = static_cast<int>(degrees) / 90;
+  }
+  const auto tint = json.find("tintindex");
+  face.is_tinted = tint != json.end() && tint->is_number() && tint->get<double>() >= 0.0;
+  return face;
+}
+
+Result<PackElement> element_of(const Json& json) {
+  if (!json.is_object()) return wrong_model("an element is not an object");
+  PackElement element;
+  const auto from = point_in(json, "from", static_cast<float>(kMinShapeUnit), static_cast<float>(kMaxShapeUnit));
+  if (!from) return from.error();
+  const auto to = point_in(json, "to", static_cast<float>(kMinShapeUnit), static_cast<float>(kMaxShapeUnit));
+  if (!to) return to.error();
+  for (int axis = 0; axis < 3; ++axis) {
+    element.from[axis] = std::min((*from)[axis], (*to)[axis]);
+    element.to[axis] = std::max((*from)[axis], (*to)[axis]);
+  }
+  if (const auto rotation = json.find("rotation"); rotation != json.end()) {
+    const auto turn = turn_of(*rotation);
+    if (!turn) return turn.error();
+    element.turn = *turn;
+  }
+  constexpr std::array<const char*, 6> kNames = {"east", "west", "up", "down", "south", "north"};
+  const auto faces = json.find("faces");
+  if (faces == json.end() || !faces->is_object()) return element;
+  for (std::size_t i = 0; i < kNames.size(); ++i) {
+    const auto one = faces->find(kNames[i]);
+    if (one == faces->end()) continue;
+    auto face = face_of(*one);
+    if (!face) return face.error();
+    element.faces[i] = std::move(*face);
+  }
+  return element;
+}
+
+/// Reads the model's own elements and textures over those of its parent.
+Status read_model(const Json& json, BlockModel& model) {
+  if (const auto textures = json.find("textures"); textures != json.end() && textures->is_object()) {
+    for (const auto& [key, value] : textures->items()) {
+      // Since 26.1, a texture can be an object with options.
+      const std::string text = value.is_object()   ? text_in(value, "sprite")
+                               : value.is_string() ? value.get<std::string>()
+                                                   : "";
+      model.textures.insert_or_assign(key, text);
+    }
+  }
+  const auto elements = json.find("elements");
+  if (elements == json.end()) return {};
+  if (!elements->is_array()) return wrong_model("\"elements\" is not an array");
+  if (elements->size() > kMaxModelElements) {
+    return make_error(ErrorCode::LimitExceeded, "the model has " + std::to_string(elements->size()) +
+                                                    " elements: at most " + std::to_string(kMaxModelElements));
+  }
+  model.has_elements = true;
+  model.elements.clear();
+  for (std::size_t i = 0; i < elements->size(); ++i) {
+    auto element = element_of((*elements)[i]);
+    if (!element) {
+      Error error = element.error();
+      error.message = "element " + std::to_string(i) + ": " + error.message;
+      return error;
+    }
+    const Vec3 size = element->to - element->from;
+    const int plates = int{size.x == 0.0F} + int{size.y == 0.0F} + int{size.z == 0.0F};
+    if (plates < 2) model.elements.push_back(std::move(*element));
+  }
+  return {};
+}
+
+}  // namespace
+
+std::optional<ResourceName> resource_name(std::string_view text) {
+  ResourceName name;
+  if (const std::size_t colon = text.find(':'); colon != std::string_view::npos) {
+    name.space = text.substr(0, colon);
+    text.remove_prefix(colon + 1);
+    if (name.space.empty()) name.space = "minecraft";
+  }
+  name.path = text;
+  if (!is_pack_path(name.space) || name.space.find('/') != std::string::npos || !is_pack_path(name.path)) {
+    return std::nullopt;
+  }
+  return name;
+}
+
+std::string to_string(const ResourceName& name) {
+  return name.space + ":" + name.path;
+}
+
+Result<std::optional<Json>> read_pack_json(const PackFiles& pack, const std::string& path) {
+  const auto bytes = pack.read(path, kMaxJsonBytes);
+  const auto named = [&](Error error) {
+    if (error.path.empty()) error.path = path;
+    return error;
+  };
+  if (!bytes) return named(bytes.error());
+  if (!*bytes) return std::optional<Json>();
+  std::string_view text = text_of(**bytes);
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  if (json_extent(text).depth > kMaxJsonDepth) return named(wrong_model("more than 64 levels of brackets"));
+  Json json = Json::parse(text, nullptr, false, true);
+  if (json.is_discarded()) return named(wrong_model("not valid JSON"));
+  if (!json.is_object()) return named(wrong_model("not a JSON object"));
+  return std::optional(std::move(json));
+}
+
+std::optional<ResourceName> BlockModel::texture(std::string_view text) const {
+  for (int i = 0; i < kMaxReferences; ++i) {
+    const bool is_reference = text.starts_with('#');
+    if (is_reference) text.remove_prefix(1);
+    const auto found = textures.find(text);
+    // Before 1.8.8, references of faces had no '#'.
+    if (found == textures.end() || found->second == text) return is_reference ? std::nullopt : resource_name(text);
+    text = found->second;
+  }
+  return std::nullopt;
+}
+
+Result<std::shared_ptr<const BlockModel>> ModelReader::model(std::string_view name) {
+  auto resource = resource_name(name);
+  if (!resource) return wrong_model("\"" + printable(name.substr(0, 100)) + "\" is not the name of a model");
+  if (resource->path.find('/') == std::string::npos) resource->path.insert(0, "block/");
+  return read(*resource, 0);
+}
+
+Result<std::shared_ptr<const BlockModel>> ModelReader::read(const ResourceName& name, int depth) {
+  const std::string key = to_string(name);
+  if (const auto known = known_.find(key); known != known_.end()) return known->second;
+  const std::string path = "assets/" + name.space + "/models/" + name.path + ".json";
+  const auto remember = [&](Known result) {
+    if (!result && result.error().path.empty()) result.error().path = path;
+    return known_.insert_or_assign(key, std::move(result)).first->second;
+  };
+  if (depth > kMaxModelParents) {
+    return make_error(ErrorCode::LimitExceeded, "more than " + std::to_string(kMaxModelParents) + " parents", path);
+  }
+  const auto json = read_pack_json(pack_, path);
+  if (!json) return remember(json.error());
+  if (!*json) return remember(std::shared_ptr<const BlockModel>());
+  BlockModel made;
+  const std::string parent = text_in(**json, "parent");
+  const auto parent_name = resource_name(parent);
+  if (!parent.empty() && !parent_name) {
+    return remember(wrong_model("\"" + printable(parent.substr(0, 100)) + "\" is not the name of a model"));
+  }
+  // The game draws models with these parents by code.
+  if (parent_name && !parent_name->path.starts_with("builtin/")) {
+    // Met again below this model, it is an ancestor of itself.
+    known_.insert_or_assign(key, Known(make_error(ErrorCode::BadFormat, "the model is its own ancestor", path)));
+    const auto inherited = read(*parent_name, depth + 1);
+    if (!inherited) return remember(inherited.error());
+    if (*inherited == nullptr)
+      return remember(wrong_model("there is no model " + to_string(*parent_name) + ", its parent"));
+    made = **inherited;
+  }
+  if (auto done = read_model(**json, made); !done) return remember(done.error());
+  return remember(std::make_shared<const BlockModel>(std::move(made)));
+}
+
+}  // namespace quoin::packs
