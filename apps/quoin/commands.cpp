@@ -110,6 +110,19 @@ void add_dimension_option(CLI::App& command, LoadOptions& load) {
           [](const std::string& text) { return std::string(text.empty() ? "must name a dimension" : ""); }, ""));
 }
 
+void add_pack_option(CLI::App& command, LoadOptions& load) {
+  command
+      .add_option_function<std::vector<std::string>>(
+          "--pack", [&load](const std::vector<std::string>& packs) { load.packs.assign(packs.begin(), packs.end()); },
+          "Resource pack of Minecraft for shapes and textures of its blocks: a folder, zip file or client .jar; can be "
+          "given several times, later packs override earlier ones")
+      ->type_name("PATH")
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->check(file_name());
+}
+
 void add_common_options(CLI::App& command, CommonOptions& options) {
   command.add_option("IN", options.input, "File to read, or - for standard input")->required()->check(file_name());
   set_heading(command, heading::kInput);
@@ -125,6 +138,7 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
                   "NAME.quoin converts all of a world")
       ->check(CLI::Range(0, 1'000));
   add_dimension_option(command, options.load);
+  add_pack_option(command, options.load);
   set_heading(command, heading::kHeights);
   add_height_options(command, options.load.heights);
   set_heading(command, heading::kGeneral);

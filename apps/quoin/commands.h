@@ -36,6 +36,8 @@ struct CommonOptions {
 
 /// Adds --dimension.
 void add_dimension_option(CLI::App& command, LoadOptions& load);
+/// Adds --pack, which can be given several times.
+void add_pack_option(CLI::App& command, LoadOptions& load);
 
 /// Adds IN and the options of CommonOptions to a command.
 void add_common_options(CLI::App& command, CommonOptions& options);

@@ -47,6 +47,7 @@
 #include <quoin/grid/voxel_field.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/grid/voxel_shape.h>
+#include <quoin/io/block_packs.h>
 #include <quoin/io/chunk_source.h>
 #include <quoin/io/file.h>
 #include <quoin/io/file_format.h>

@@ -5,6 +5,7 @@
 #include <set>
 #include <system_error>
 
+#include <quoin/io/block_packs.h>
 #include <quoin/io/chunk_source.h>
 #include <quoin/io/file.h>
 #include <quoin/io/vox.h>
@@ -419,11 +420,30 @@ Result<std::vector<std::string>> unsupported_features(const LoadedScene& loaded,
   return warnings_of_saving({loaded.scene, &loaded, {}, {}}, path);
 }
 
+namespace {
+
+/// Gives the result of `read` the looks of the packs, which are opened first.
+template <class Read>
+Result<LoadedScene> read_with_packs(const LoadOptions& options, Read read) {
+  if (options.packs.empty()) return read();
+  const auto packs = BlockPacks::open(options.packs);
+  if (!packs) return packs.error();
+  Result<LoadedScene> loaded = read();
+  if (!loaded) return loaded;
+  (*packs)->apply(loaded->scene.types);
+  if (std::string line = to_string((*packs)->report()); !line.empty()) loaded->warnings.push_back(std::move(line));
+  return loaded;
+}
+
+}  // namespace
+
 Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options, Threads threads,
                                const Progress& progress) {
   const FormatInput input{{}, bytes, options, threads, progress};
-  if (options.raw) return read_volume_scene(input);
-  return read_as(options.heights ? FileFormat::Heights : detect_format(bytes), input);
+  return read_with_packs(options, [&] {
+    if (options.raw) return read_volume_scene(input);
+    return read_as(options.heights ? FileFormat::Heights : detect_format(bytes), input);
+  });
 }
 
 std::vector<std::filesystem::path> sidecar_files_of(const std::filesystem::path& path, SidecarFiles allowed) {
@@ -446,8 +466,10 @@ Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOpti
   return file ? load_scene(*file, options, threads, progress) : Result<LoadedScene>(file.error());
 }
 
-Result<LoadedScene> load_scene(const DetectedFile& file, const LoadOptions& options, Threads threads,
-                               const Progress& progress) {
+namespace {
+
+Result<LoadedScene> read_detected(const DetectedFile& file, const LoadOptions& options, Threads threads,
+                                  const Progress& progress) {
   const std::filesystem::path& path = file.path;
   FormatInput input{path, {}, options, threads, progress};
   if (options.raw) return with_path(read_volume_scene(input), path);
@@ -467,6 +489,13 @@ Result<LoadedScene> load_scene(const DetectedFile& file, const LoadOptions& opti
     if (of_all || !can(format, FormatCapability::Meshes)) format = of_all;
   }
   return with_path(read_as(format, input), path);
+}
+
+}  // namespace
+
+Result<LoadedScene> load_scene(const DetectedFile& file, const LoadOptions& options, Threads threads,
+                               const Progress& progress) {
+  return read_with_packs(options, [&] { return read_detected(file, options, threads, progress); });
 }
 
 Result<std::unique_ptr<ChunkSource>> open_chunk_source(const std::filesystem::path& path, std::string_view dimension) {

@@ -29,8 +29,10 @@ Conversion convert_file(const ConvertOptions& options, const FormatInfo& format)
   const bool is_mesh = format.can(FormatCapability::Meshes);
   if (format.format == FileFormat::World && can(from, FormatCapability::Chunks))
     return convert_by_chunks(options, input->file);
-  if (from == FileFormat::World && format.format == FileFormat::World) return copy_world_file(options);
-  if (from == FileFormat::World && is_mesh && meshes_by_chunks(options)) {
+  // Packs change the types of the whole scene.
+  const bool is_kept = from == FileFormat::World && options.common.load.packs.empty();
+  if (is_kept && format.format == FileFormat::World) return copy_world_file(options);
+  if (is_kept && is_mesh && meshes_by_chunks(options)) {
     auto meshed = mesh_world_file(options);
     if (!meshed) return meshed.error();
     if (*meshed) return std::move(**meshed);

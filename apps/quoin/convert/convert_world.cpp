@@ -1,5 +1,8 @@
 #include <algorithm>
+#include <memory>
+#include <utility>
 
+#include <quoin/io/block_packs.h>
 #include <quoin/io/chunk_source.h>
 #include <quoin/store/world_import.h>
 #include <quoin/store/world_maintenance.h>
@@ -45,8 +48,13 @@ Status add_thumbnail(const ChunkSource& source, const ConvertOptions& options) {
 
 Result<Outcome> convert_by_chunks(const ConvertOptions& options, const DetectedFile& file) {
   Stopwatch watch;
-  const auto source = open_chunk_source(file, options.common.load.dimension);
+  const std::vector<std::filesystem::path>& pack_files = options.common.load.packs;
+  Result<std::shared_ptr<BlockPacks>> packs = nullptr;
+  if (!pack_files.empty()) packs = BlockPacks::open(pack_files);
+  if (!packs) return packs.error();
+  auto source = open_chunk_source(file, options.common.load.dimension);
   if (!source) return source.error();
+  if (*packs != nullptr) source = with_packs(std::move(*source), *packs);
   catch_interrupts();
   Outcome outcome;
   outcome.files = {options.output};
@@ -64,6 +72,9 @@ Result<Outcome> convert_by_chunks(const ConvertOptions& options, const DetectedF
     std::string names;
     for (const std::string& name : imported->guessed) names += (names.empty() ? "" : ", ") + name;
     outcome.warnings.push_back("unknown blocks, with an appearance guessed from their names: " + names);
+  }
+  if (*packs != nullptr) {
+    if (std::string line = to_string((*packs)->report()); !line.empty()) outcome.warnings.push_back(std::move(line));
   }
   outcome.seconds.write = watch.lap();
   if (Status counted = count_faces_of_output(options, outcome); !counted) return counted.error();

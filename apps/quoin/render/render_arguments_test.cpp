@@ -113,9 +113,10 @@ const std::vector<Sample> kSamples = {{"--size", "9x9", kAll},
 
 TEST(RenderArguments, SamplesCoverEveryOption) {
   // Options of all commands, the options of kModes, and --fps, which needs a video.
-  std::set<std::string> sampled = {"--help",    "--hidden",    "--frame",  "--allow-outside-files",
-                                   "--around",  "--dimension", "--json",   "--quiet",
-                                   "--threads", "--light",     "--preset", "--fps"};
+  std::set<std::string> sampled = {"--help",   "--hidden",    "--frame", "--allow-outside-files",
+                                   "--around", "--dimension", "--pack",  "--json",
+                                   "--quiet",  "--threads",   "--light", "--preset",
+                                   "--fps"};
   for (const Sample& sample : kSamples) sampled.insert(sample.option);
   CLI::App command;
   RenderArguments arguments;

@@ -1,6 +1,7 @@
 #include "io/packs/pack_files.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <ranges>
 #include <system_error>
@@ -24,6 +25,17 @@ constexpr std::size_t kMaxZipBytes = std::size_t{2} << 30;
 Error too_large(std::string_view path, std::uint64_t size, std::size_t most) {
   return make_error(ErrorCode::LimitExceeded, printable(path) + " has " + std::to_string(size) + " bytes: at most " +
                                                   std::to_string(most) + " are read");
+}
+
+/// Returns the path of a texture of a block in packs before 1.13, or since; empty for other files.
+std::string name_in_other_versions(std::string_view path) {
+  constexpr std::array<std::string_view, 2> kFolders = {"/textures/block/", "/textures/blocks/"};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const std::size_t at = path.find(kFolders[i]);
+    if (at == std::string_view::npos) continue;
+    return std::string(path.substr(0, at)).append(kFolders[1 - i]).append(path.substr(at + kFolders[i].size()));
+  }
+  return {};
 }
 
 class FolderPack final : public PackFiles {
@@ -152,8 +164,12 @@ Result<std::shared_ptr<const PackStack>> PackStack::open(std::span<const fs::pat
 }
 
 Result<FileBytes> PackStack::read(std::string_view path, std::size_t max_bytes) const {
+  const std::string other_name = name_in_other_versions(path);
   for (const auto& pack : std::views::reverse(packs_)) {
     auto bytes = pack->read(path, max_bytes);
+    if (!bytes || *bytes) return bytes;
+    if (other_name.empty()) continue;
+    bytes = pack->read(other_name, max_bytes);
     if (!bytes || *bytes) return bytes;
   }
   return FileBytes();

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <quoin/core/result.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/io/chunk_source.h>
+
+namespace [[gnu::visibility("default")]] quoin {
+
+namespace packs {
+class PackFiles;
+class BlockLooks;
+}  // namespace packs
+
+/// The counts of BlockPacks::apply, over all calls.
+struct BlockPackReport {
+  std::size_t types = 0;             ///< Minecraft blocks
+  std::size_t without_look = 0;      ///< of them, blocks without a usable block state or model, which stay as they are
+  std::size_t missing_textures = 0;  ///< distinct textures that the packs lack or that cannot be read
+  std::size_t missing_models = 0;    ///< distinct models, of the same kind
+  std::vector<std::string> names{};  ///< the first 8 of these blocks, textures and models, with the reason
+};
+
+/// Returns one line for a warning; empty if nothing is missing.
+[[nodiscard]] std::string to_string(const BlockPackReport& report);
+
+/// Resource packs of Minecraft (Java): the shapes and textures of blocks. Later packs override earlier ones file by
+/// file, so name the client's .jar first.
+///
+///   auto packs = BlockPacks::open({{"client.jar", "my_pack.zip"}});
+///   (*packs)->apply(loaded.scene.types);
+///
+/// Types:    those of worlds, schematics and structures (io/formats.h), also after conversion to .quoin. Each gets
+///           `faces`, `orientations` and `shapes` by its block's states, and the mean of its textures as colour.
+/// Limits:   docs/formats/packs.md lists them, with the features that are not supported.
+/// Memory:   the bytes of zipped packs, and the textures and models that types use.
+/// Threads:  any number may call `apply` at once.
+class BlockPacks {
+ public:
+  /// Opens packs: folders, zip files or .jar files. Errors: CannotRead, BadFormat; InvalidArgument if a pack has no
+  /// folder `assets`; Unsupported in builds without worlds of games; LimitExceeded above 2 GiB.
+  [[nodiscard]] static Result<std::shared_ptr<BlockPacks>> open(std::span<const std::filesystem::path> paths);
+  /// As above, from the bytes of zip files.
+  [[nodiscard]] static Result<std::shared_ptr<BlockPacks>> open(std::vector<std::vector<std::byte>> zips);
+  ~BlockPacks();
+  BlockPacks(const BlockPacks&) = delete;
+  BlockPacks& operator=(const BlockPacks&) = delete;
+
+  /// Gives the Minecraft blocks of a registry the looks of the packs. Other types, and blocks that the packs do not
+  /// have, stay as they are. Cost: reads each texture and model once.
+  void apply(VoxelRegistry& types);
+  /// Returns the properties of a type with the looks of the packs.
+  [[nodiscard]] VoxelProperties applied(const VoxelProperties& type);
+  [[nodiscard]] BlockPackReport report() const;
+
+ private:
+  explicit BlockPacks(std::unique_ptr<packs::BlockLooks> looks);
+  friend class packs::BlockLooks;
+  std::unique_ptr<packs::BlockLooks> looks_;
+};
+
+/// Returns a source whose types have the looks of packs. It is otherwise equal.
+[[nodiscard]] std::unique_ptr<ChunkSource> with_packs(std::unique_ptr<ChunkSource> source,
+                                                      std::shared_ptr<BlockPacks> packs);
+
+}  // namespace quoin

@@ -1,0 +1,139 @@
+#include <quoin/io/block_packs.h>
+
+#include <mutex>
+#include <utility>
+
+#include <quoin/core/assert.h>
+#include <quoin/core/thousands.h>
+
+#include "io/packs/pack_files.h"
+#ifndef QUOIN_WITHOUT_GAME_WORLDS
+#include "io/packs/pack_looks.h"
+#endif
+
+namespace quoin {
+
+namespace {
+
+std::string counted(std::size_t count, const char* one, const char* many) {
+  return with_thousands(static_cast<std::int64_t>(count)) + " " + (count == 1 ? one : many);
+}
+
+/// A source whose types have the looks of packs, with the same numbers.
+class PackedSource final : public ChunkSource {
+ public:
+  PackedSource(std::unique_ptr<ChunkSource> source, std::shared_ptr<BlockPacks> packs)
+      : ChunkSource(source->info(), {source->parts().begin(), source->parts().end()}),
+        source_(std::move(source)),
+        packs_(std::move(packs)) {}
+
+  [[nodiscard]] VoxelRegistry types() const override {
+    const VoxelRegistry plain = source_->types();
+    const std::scoped_lock lock(mutex_);
+    while (types_.size() < plain.size()) {
+      const auto added = types_.add(packs_->applied(plain[static_cast<VoxelType>(types_.size())]));
+      QUOIN_ASSERT(added, "valid types, as many as in the source");
+    }
+    return types_;
+  }
+
+  [[nodiscard]] Result<SourcePart> read_part(std::size_t part) const override { return source_->read_part(part); }
+
+ private:
+  std::unique_ptr<ChunkSource> source_;
+  std::shared_ptr<BlockPacks> packs_;
+  mutable std::mutex mutex_;
+  mutable VoxelRegistry types_;
+};
+
+}  // namespace
+
+std::string to_string(const BlockPackReport& report) {
+  std::string text;
+  const auto add = [&](const std::string& more) { text += (text.empty() ? "resource packs: " : ", ") + more; };
+  if (report.without_look > 0) {
+    add(counted(report.without_look, "block type", "block types") + " of " +
+        with_thousands(static_cast<std::int64_t>(report.types)) + " without a look");
+  }
+  if (report.missing_textures > 0) add(counted(report.missing_textures, "texture", "textures") + " missing");
+  if (report.missing_models > 0) add(counted(report.missing_models, "model", "models") + " missing");
+  std::string names;
+  for (const std::string& name : report.names) names += (names.empty() ? ": " : ", ") + name;
+  const std::size_t all = report.without_look + report.missing_textures + report.missing_models;
+  return text + names + (report.names.size() < all ? ", ..." : "");
+}
+
+#ifdef QUOIN_WITHOUT_GAME_WORLDS
+
+// Only the names remain; there are no objects.
+namespace packs {
+class BlockLooks {
+ public:
+  [[nodiscard]] static VoxelProperties applied(const VoxelProperties& type) { return type; }
+  [[nodiscard]] static BlockPackReport report() { return {}; }
+};
+}  // namespace packs
+
+namespace {
+
+Error packs_left_out() {
+  return make_error(ErrorCode::Unsupported,
+                    "cannot read resource packs: Quoin was built with QUOIN_WITH_GAME_WORLDS=OFF");
+}
+
+}  // namespace
+
+Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::span<const std::filesystem::path> /*paths*/) {
+  return packs_left_out();
+}
+
+Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::vector<std::vector<std::byte>> /*zips*/) {
+  return packs_left_out();
+}
+
+#else
+
+Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::span<const std::filesystem::path> paths) {
+  auto files = packs::PackStack::open(paths);
+  if (!files) return files.error();
+  return std::shared_ptr<BlockPacks>(new BlockPacks(std::make_unique<packs::BlockLooks>(std::move(*files))));
+}
+
+Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::vector<std::vector<std::byte>> zips) {
+  std::vector<std::shared_ptr<const packs::PackFiles>> opened;
+  for (std::vector<std::byte>& zip : zips) {
+    auto pack = packs::open_pack(std::move(zip));
+    if (!pack) return pack.error();
+    opened.push_back(std::move(*pack));
+  }
+  auto files = std::make_shared<const packs::PackStack>(std::move(opened));
+  return std::shared_ptr<BlockPacks>(new BlockPacks(std::make_unique<packs::BlockLooks>(std::move(files))));
+}
+
+#endif
+
+BlockPacks::BlockPacks(std::unique_ptr<packs::BlockLooks> looks) : looks_(std::move(looks)) {}
+BlockPacks::~BlockPacks() = default;
+
+void BlockPacks::apply(VoxelRegistry& types) {
+  for (std::size_t i = 1; i < types.size(); ++i) {
+    const auto type = static_cast<VoxelType>(i);
+    VoxelProperties made = looks_->applied(types[type]);
+    if (!(made == types[type])) types.replace(type, std::move(made));
+  }
+}
+
+VoxelProperties BlockPacks::applied(const VoxelProperties& type) {
+  return looks_->applied(type);
+}
+
+BlockPackReport BlockPacks::report() const {
+  return looks_->report();
+}
+
+std::unique_ptr<ChunkSource> with_packs(std::unique_ptr<ChunkSource> source, std::shared_ptr<BlockPacks> packs) {
+  QUOIN_ASSERT(source != nullptr && packs != nullptr, "a source and packs");
+  return std::make_unique<PackedSource>(std::move(source), std::move(packs));
+}
+
+}  // namespace quoin

@@ -1,0 +1,516 @@
+#include "io/packs/pack_looks.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+#include <quoin/core/assert.h>
+
+#include "core/bytes/text.h"
+#include "io/minecraft/block_looks.h"
+#include "io/minecraft/block_types.h"
+#include "io/packs/pack_shapes.h"
+#include "io/packs/state_conditions.h"
+
+namespace quoin::packs {
+
+namespace {
+
+constexpr Rgba8 kWhite{255, 255, 255};
+constexpr std::size_t kMaxNames = 8;  // of a report
+
+Rgba8 colour_of_number(std::uint32_t rgb) {
+  return {static_cast<std::uint8_t>(rgb >> 16), static_cast<std::uint8_t>(rgb >> 8), static_cast<std::uint8_t>(rgb)};
+}
+
+std::string_view without_space(std::string_view block) {
+  const std::size_t colon = block.find(':');
+  return colon == std::string_view::npos ? block : block.substr(colon + 1);
+}
+
+bool has_any(std::string_view name, std::initializer_list<std::string_view> words) {
+  return std::ranges::any_of(words, [&](std::string_view word) { return name.find(word) != std::string_view::npos; });
+}
+
+/// Returns the colour of tinted faces that does not depend on the state.
+/// Source: the Minecraft Wiki, "Block colors" and "Color" (https://minecraft.wiki/w/Block_colors).
+Rgba8 tint_of(const VoxelProperties& type, std::string_view name) {
+  if (const auto found = type.attributes.find(minecraft::kTintColourAttribute); found != type.attributes.end()) {
+    std::uint32_t rgb = 0;
+    const std::string& digits = found->second;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), rgb, 16);
+    if (error == std::errc() && end == digits.data() + digits.size()) return colour_of_number(rgb);
+  }
+  constexpr minecraft::BiomeTints kPlains{};
+  if (name == "spruce_leaves") return colour_of_number(0x619961);
+  if (name == "birch_leaves") return colour_of_number(0x80A755);
+  if (name == "lily_pad") return colour_of_number(0x208030);
+  if (name.starts_with("attached_") && name.ends_with("_stem")) return colour_of_number(0xE0C71C);
+  if (has_any(name, {"water", "bubble_column"})) return colour_of_number(kPlains.water);
+  if (has_any(name, {"leaves", "vine"})) return colour_of_number(kPlains.foliage);
+  if (has_any(name, {"grass", "fern", "sugar_cane", "petals", "wildflowers", "bush"})) {
+    return colour_of_number(kPlains.grass);
+  }
+  return kWhite;
+}
+
+/// A tint by a number in the state: the power of wires, the age of stems. Near powers have one colour, since a type has
+/// few parts.
+struct StateTint {
+  std::string_view property;
+  int (*group)(int value) = nullptr;  ///< returns the value whose colour stands for it
+  Rgba8 (*colour)(int value) = nullptr;
+};
+
+const StateTint* state_tint_of(std::string_view name) {
+  static constexpr StateTint kWire{
+      "power",
+      [](int power) {
+        constexpr std::array<int, 16> kGroups = {0, 1, 1, 4, 4, 4, 7, 7, 7, 10, 10, 10, 13, 13, 13, 15};
+        return kGroups[static_cast<std::size_t>(std::clamp(power, 0, 15))];
+      },
+      [](int power) {
+        const float share = static_cast<float>(power) / 15.0F;
+        const auto byte = [](float unit) { return static_cast<std::uint8_t>(std::clamp(unit, 0.0F, 1.0F) * 255.0F); };
+        return Rgba8{byte(share * 0.6F + (power > 0 ? 0.4F : 0.3F)), byte(share * share * 0.7F - 0.5F),
+                     byte(share * share * 0.6F - 0.7F)};
+      }};
+  static constexpr StateTint kStem{"age", [](int age) { return std::clamp(age, 0, 7); },
+                                   [](int age) {
+                                     return Rgba8{static_cast<std::uint8_t>(age * 32),
+                                                  static_cast<std::uint8_t>(255 - age * 8),
+                                                  static_cast<std::uint8_t>(age * 4)};
+                                   }};
+  if (name == "redstone_wire") return &kWire;
+  return name == "melon_stem" || name == "pumpkin_stem" ? &kStem : nullptr;
+}
+
+/// A model that a type shows, and when.
+struct Outcome {
+  StateModel state;
+  Rgba8 tint = kWhite;
+  std::vector<ShapeCondition> when;
+  std::shared_ptr<const BlockModel> model;
+};
+
+bool is_same_model(const StateModel& a, const StateModel& b) {
+  return std::tie(a.model, a.x, a.y, a.keeps_uv) == std::tie(b.model, b.x, b.y, b.keeps_uv);
+}
+
+bool is_always(const std::vector<ShapeCondition>& when) {
+  return when.size() == 1 && when.front() == ShapeCondition{};
+}
+
+/// Returns the group of blocks that join each other (ShapeRules::groups).
+std::uint32_t joined_group(std::string_view name) {
+  if (name.ends_with("redstone_wire")) return 1U << 3;
+  if (name.ends_with("fence")) return has_any(name, {"nether"}) ? 1U << 1 : 1U << 0;
+  return 1U << 2;
+}
+
+}  // namespace
+
+Result<std::shared_ptr<const BlockStates>> PackLibrary::states_of(const std::string& block) {
+  if (const auto known = states.find(block); known != states.end()) return known->second;
+  using Known = Result<std::shared_ptr<const BlockStates>>;
+  const auto remember = [&](Known result) { return states.emplace(block, std::move(result)).first->second; };
+  const auto name = resource_name(block);
+  if (!name) return remember(std::shared_ptr<const BlockStates>());
+  const std::string path = "assets/" + name->space + "/blockstates/" + name->path + ".json";
+  const auto json = read_pack_json(pack, path);
+  if (!json) return remember(json.error());
+  if (!*json) return remember(std::shared_ptr<const BlockStates>());
+  auto parsed = parse_block_states(**json);
+  if (!parsed) {
+    parsed.error().path = path;
+    return remember(parsed.error());
+  }
+  return remember(std::make_shared<const BlockStates>(std::move(*parsed)));
+}
+
+/// Makes the look of one type from one library.
+class BlockLooks::Maker {
+ public:
+  Maker(BlockLooks& looks, PackLibrary& library, const VoxelProperties& type)
+      : looks_(looks),
+        library_(library),
+        type_(type),
+        states_(type),
+        name_(without_space(states_.block())),
+        is_own_(looks.own_library_ && &library == &*looks.own_library_) {}
+
+  /// Returns the type with its look; nullopt if the library has none. Errors: of files, with their path.
+  Result<std::optional<VoxelProperties>> make() {
+    if (is_fluid()) {
+      if (auto fluid = make_fluid()) return std::optional(std::move(*fluid));
+    }
+    const auto found = library_.states_of(states_.block());
+    if (!found) return found.error();
+    if (*found == nullptr) return std::optional<VoxelProperties>();
+    if (auto done = find_outcomes(**found); !done) return done.error();
+    // The game draws models without elements by code.
+    std::erase_if(outcomes_, [](const Outcome& each) { return each.model->elements.empty(); });
+    if (outcomes_.empty()) return std::optional<VoxelProperties>();
+    const auto is_textured = [&](const Outcome& outcome) {
+      return std::ranges::any_of(outcome.model->elements, [&](const PackElement& element) {
+        return std::ranges::any_of(
+            element.faces, [&](const auto& face) { return face && texture_of_face(*outcome.model, *face) != nullptr; });
+      });
+    };
+    has_textures_ = std::ranges::any_of(outcomes_, is_textured);
+    is_multipart_ = (*found)->is_multipart;
+    if (!is_multipart_) {
+      if (auto cube = make_cube()) return std::optional(std::move(*cube));
+    }
+    auto shaped = make_shapes();
+    if (!shaped) return shaped.error();
+    return std::optional(std::move(*shaped));
+  }
+
+ private:
+  [[nodiscard]] bool is_fluid() const {
+    if (name_ != "water" && name_ != "lava" && name_ != "bubble_column") return false;
+    const minecraft::StateField* const level = states_.field("level");
+    return level == nullptr ? type_.state_bits == 0 || name_ == "bubble_column"
+                            : level->first_bit == 0 && level->kind == 'n';
+  }
+
+  std::optional<VoxelProperties> make_fluid() {
+    const std::string fluid = name_ == "lava" ? "block/lava" : "block/water";
+    const auto read = [&](const char* end) { return texture_named({"minecraft", fluid + end}); };
+    const PackTexture* const still = read("_still");
+    if (still == nullptr) return std::nullopt;
+    const PackTexture* const flow = read("_flow");
+    const Rgba8 tint = name_ == "lava" ? kWhite : tint_of(type_, name_);
+    const VoxelFace top{.texture = still->texture, .turn = 3, .tint = tint, .alpha = still->alpha};
+    VoxelFace side = top;
+    side.turn = 0;
+    if (flow != nullptr) {
+      // A side shows a quarter of this texture, which has twice the edge.
+      FaceLayer layer{.look = {.texture = flow->texture, .alpha = flow->alpha}};
+      if (flow->texture.size() == 2 * still->texture.size()) {
+        layer.part = {0.0F, 0.0F, 8.0F, 8.0F};
+        layer = looks_.textures_.blended(layer, nullptr);
+      }
+      side.texture = layer.look.texture;
+      side.alpha = layer.look.alpha;
+    }
+    ShapeRules rules{.neighbours = ShapeNeighbours::Fluid, .groups = name_ == "lava" ? 1U << 5 : 1U << 4};
+    auto shapes = VoxelShapes::from_rules(std::move(rules));
+    if (!shapes) return std::nullopt;
+    VoxelProperties made = type_;
+    made.faces = VoxelFaces(side, top, top);
+    made.shapes = std::move(*shapes);
+    settle(made);
+    return made;
+  }
+
+  /// Fills `outcomes_`: models without cases that cannot hold, equal ones once.
+  Status find_outcomes(const BlockStates& states) {
+    const StateTint* const by_state = state_tint_of(name_);
+    const Rgba8 tint = tint_of(type_, name_);
+    const bool has_others = states.cases.size() > 1;
+    for (const StateCase& each : states.cases) {
+      auto when = states_.conditions(each);
+      if (!when) return when.error();
+      if (when->empty()) continue;
+      // A variant without properties stands for all states that have no other.
+      if (!states.is_multipart && has_others && is_always(*when) && !outcomes_.empty()) continue;
+      const auto model = library_.models.model(each.models.front().model);
+      if (!model || *model == nullptr) {
+        note_model(each.models.front().model, model ? std::string("no such model") : to_string(model.error()));
+        continue;
+      }
+      const minecraft::StateField* const field = by_state == nullptr ? nullptr : states_.field(by_state->property);
+      if (field == nullptr || !has_tinted_face(**model)) {
+        add_outcome(each.models.front(), tint, std::move(*when), *model);
+      } else {
+        add_by_state(*by_state, *field, each.models.front(), *when, *model);
+      }
+    }
+    return {};
+  }
+
+  /// Counts a model that cannot be used, once.
+  void note_model(const std::string& name, const std::string& reason) {
+    if (is_own_ || !looks_.missing_.insert("model " + name).second) return;
+    ++looks_.report_.missing_models;
+    looks_.note("model " + printable(name), reason);
+  }
+
+  static bool has_tinted_face(const BlockModel& model) {
+    return std::ranges::any_of(model.elements, [](const PackElement& element) {
+      return std::ranges::any_of(element.faces, [](const auto& face) { return face && face->is_tinted; });
+    });
+  }
+
+  /// Adds an outcome per colour of a tint that the state selects.
+  void add_by_state(const StateTint& tint, const minecraft::StateField& field, const StateModel& state,
+                    const std::vector<ShapeCondition>& when, const std::shared_ptr<const BlockModel>& model) {
+    const std::uint32_t mask = mask_of(field);
+    constexpr std::uint32_t kValues = 16;
+    for (std::uint32_t value = 0; value < kValues && value >> field.bits == 0; ++value) {
+      std::vector<ShapeCondition> narrower;
+      for (ShapeCondition condition : when) {
+        const std::uint32_t bits = value << field.first_bit;
+        if ((condition.state_mask & mask) == mask && (condition.state & mask) != bits) continue;
+        condition.state_mask |= mask;
+        condition.state |= bits;
+        narrower.push_back(condition);
+      }
+      const Rgba8 colour = tint.colour(tint.group(static_cast<int>(value)));
+      if (!narrower.empty()) add_outcome(state, colour, std::move(narrower), model);
+    }
+  }
+
+  void add_outcome(const StateModel& state, Rgba8 tint, std::vector<ShapeCondition> when,
+                   std::shared_ptr<const BlockModel> model) {
+    const auto same = std::ranges::find_if(
+        outcomes_, [&](const Outcome& each) { return is_same_model(each.state, state) && each.tint == tint; });
+    if (same == outcomes_.end()) {
+      outcomes_.push_back({state, tint, std::move(when), std::move(model)});
+    } else if (is_always(when) || is_always(same->when)) {
+      same->when.assign(1, {});
+    } else {
+      same->when.insert(same->when.end(), when.begin(), when.end());
+    }
+  }
+
+  const PackTexture* texture_named(const ResourceName& name) {
+    const auto found = looks_.textures_.texture(name);
+    if (found && *found != nullptr) return *found;
+    if (!is_own_ && looks_.missing_.insert(to_string(name)).second) {
+      ++looks_.report_.missing_textures;
+      looks_.note(to_string(name), found ? "no such texture" : to_string(found.error()));
+    }
+    return nullptr;
+  }
+
+  const PackTexture* texture_of_face(const BlockModel& model, const PackFace& face) {
+    const auto name = model.texture(face.texture);
+    return name ? texture_named(*name) : nullptr;
+  }
+
+  [[nodiscard]] std::vector<ShapeElement> elements(const Outcome& outcome) {
+    const auto texture = [&](const BlockModel& model, const PackFace& face) { return texture_of_face(model, face); };
+    const FaceColours colours{texture, {type_.colour.r, type_.colour.g, type_.colour.b}, outcome.tint};
+    const AxisOrientation turn = orientation_of(outcome.state);
+    if (!outcome.state.keeps_uv || turn == AxisOrientation()) {
+      return elements_of(*outcome.model, outcome.model->elements, colours, has_textures_, looks_.textures_);
+    }
+    std::vector<PackElement> turned;
+    for (const PackElement& each : outcome.model->elements) turned.push_back(turned_with_world(each, turn));
+    return elements_of(*outcome.model, turned, colours, has_textures_, looks_.textures_);
+  }
+
+  /// Returns the orientation that remains after `elements`.
+  static AxisOrientation remaining_turn(const Outcome& outcome) {
+    return outcome.state.keeps_uv ? AxisOrientation() : orientation_of(outcome.state);
+  }
+
+  /// Returns true if all outcomes are one model, turned by the state.
+  [[nodiscard]] bool is_one_model() const {
+    const Outcome& first = outcomes_.front();
+    return std::ranges::all_of(outcomes_, [&](const Outcome& each) {
+      const bool is_locked = each.state.keeps_uv && orientation_of(each.state) != AxisOrientation();
+      return each.model == first.model && each.tint == first.tint && (!is_locked || outcomes_.size() == 1);
+    });
+  }
+
+  /// Returns the orientations of outcomes that are one model; nullopt if the bits that select them lie too far apart.
+  [[nodiscard]] std::optional<StateOrientations> orientations() const {
+    StateOrientations made;
+    if (outcomes_.size() == 1) {
+      const AxisOrientation turn = remaining_turn(outcomes_.front());
+      if (turn != AxisOrientation()) made.by_value.push_back(turn);
+      return made;
+    }
+    std::uint32_t mask = 0;
+    for (const Outcome& outcome : outcomes_) {
+      for (const ShapeCondition& condition : outcome.when) {
+        if (condition.state_mask == 0 || !condition.connected.empty() || !condition.unconnected.empty()) {
+          return std::nullopt;
+        }
+        mask |= condition.state_mask;
+      }
+    }
+    constexpr int kMaxBits = 6;
+    const int first = std::countr_zero(mask);
+    if (static_cast<int>(std::bit_width(mask)) - first > kMaxBits) return std::nullopt;
+    made.first_bit = static_cast<std::uint8_t>(first);
+    for (std::uint32_t value = 0; value <= mask >> first; ++value) {
+      const std::uint32_t state = value << first;
+      const auto shown = std::ranges::find_if(outcomes_, [&](const Outcome& outcome) {
+        return std::ranges::any_of(outcome.when, [&](const ShapeCondition& each) { return holds(each, state); });
+      });
+      made.by_value.push_back(shown == outcomes_.end() ? AxisOrientation() : remaining_turn(*shown));
+    }
+    while (!made.by_value.empty() && made.by_value.back() == AxisOrientation()) made.by_value.pop_back();
+    // A single orientation would turn all states.
+    if (made.by_value.size() == 1) made.by_value.emplace_back();
+    if (made.by_value.size() > AxisOrientation::kCount) return std::nullopt;
+    return made;
+  }
+
+  /// Returns the type as a whole cube that the state turns; nullopt for other models.
+  std::optional<VoxelProperties> make_cube() {
+    if (!has_textures_ || !is_one_model()) return std::nullopt;
+    const auto faces = faces_of_cube(elements(outcomes_.front()));
+    if (!faces) return std::nullopt;
+    const auto turns = orientations();
+    if (!turns) return std::nullopt;
+    VoxelProperties made = type_;
+    made.faces = VoxelFaces(*faces);
+    made.orientations = *turns;
+    settle(made);
+    return made;
+  }
+
+  /// Adds the parts of an outcome: several if it has more elements than a shape.
+  static Status add_parts(const Outcome& outcome, const std::vector<ShapeElement>& all,
+                          const AxisOrientation& orientation, ShapeRules& rules) {
+    for (std::size_t first = 0; first < all.size(); first += kMaxShapeElements) {
+      const std::size_t end = std::min(all.size(), first + kMaxShapeElements);
+      auto shape = VoxelShape::from_elements(
+          {all.begin() + static_cast<std::ptrdiff_t>(first), all.begin() + static_cast<std::ptrdiff_t>(end)});
+      if (!shape) return shape.error();
+      ShapePart part{.shape = std::move(*shape), .orientation = orientation};
+      if (!is_always(outcome.when)) part.when = outcome.when;
+      rules.parts.push_back(std::move(part));
+    }
+    return {};
+  }
+
+  Result<VoxelProperties> make_shapes() {
+    VoxelProperties made = type_;
+    ShapeRules rules;
+    if (states_.connects()) {
+      rules.neighbours = ShapeNeighbours::Connected;
+      rules.groups = joined_group(name_);
+      rules.connects_to_full_sides = name_ != "redstone_wire";
+    }
+    std::vector<std::vector<ShapeElement>> all;
+    const auto turns = !is_multipart_ && is_one_model() ? orientations() : std::nullopt;
+    if (turns) {
+      made.orientations = *turns;
+      all.push_back(elements(outcomes_.front()));
+      Outcome merged = outcomes_.front();
+      for (const Outcome& outcome : outcomes_) {
+        if (&outcome != &outcomes_.front()) {
+          merged.when.insert(merged.when.end(), outcome.when.begin(), outcome.when.end());
+        }
+      }
+      if (auto done = add_parts(merged, all.back(), {}, rules); !done) return done.error();
+    } else {
+      for (const Outcome& outcome : outcomes_) {
+        all.push_back(elements(outcome));
+        if (auto done = add_parts(outcome, all.back(), remaining_turn(outcome), rules); !done) return done.error();
+      }
+    }
+    auto shapes = VoxelShapes::from_rules(std::move(rules));
+    if (!shapes) return shapes.error();
+    made.shapes = std::move(*shapes);
+    made.faces = common_faces(all);
+    settle(made);
+    return made;
+  }
+
+  /// Returns a texture per direction, for uses that show a whole voxel: that of the largest face. No faces if there are
+  /// no textures.
+  static VoxelFaces common_faces(const std::vector<std::vector<ShapeElement>>& all) {
+    std::array<VoxelFace, 6> faces;
+    std::array<float, 6> areas{};
+    const VoxelFace* any = nullptr;
+    for (const auto& elements : all) {
+      for (const ShapeElement& element : elements) {
+        const Vec3 size = element.max - element.min;
+        for (const Direction direction : kDirections) {
+          const auto i = static_cast<std::size_t>(direction);
+          const ElementFace& face = element.faces[i];
+          if (!face.is_drawn || !face.face || face.face->texture.is_null()) continue;
+          if (any == nullptr) any = &*face.face;
+          const float area = size[frame_of(direction).u] * size[frame_of(direction).v];
+          if (area <= areas[i]) continue;
+          areas[i] = area;
+          faces[i] = *face.face;
+        }
+      }
+    }
+    if (any == nullptr) return {};
+    for (VoxelFace& face : faces) {
+      if (face.texture.is_null()) face = *any;
+    }
+    return VoxelFaces(faces);
+  }
+
+  /// Sets the properties that depend on the look.
+  void settle(VoxelProperties& made) const {
+    bool is_opaque = true;
+    for_each_look(made, [&](const VoxelFace& look) { is_opaque = is_opaque && look.alpha == FaceAlpha::Opaque; });
+    if (!has_textures_ && made.faces.empty()) is_opaque = !has_any(name_, {"glass", "ice", "slime", "honey"});
+    made.visibility = is_opaque ? Visibility::Opaque : Visibility::Transparent;
+    if (is_opaque) made.colour.a = 255;
+    made.occludes = std::nullopt;
+    // Shapes stop light by their sides.
+    if (is_opaque && !made.shapes.empty()) made.blocks_light = std::nullopt;
+    made.attributes.erase(minecraft::kGuessAttribute);
+  }
+
+  BlockLooks& looks_;
+  PackLibrary& library_;
+  const VoxelProperties& type_;
+  TypeStates states_;
+  std::string_view name_;
+  bool is_own_ = false;
+  bool is_multipart_ = false;
+  bool has_textures_ = false;
+  std::vector<Outcome> outcomes_;
+};
+
+BlockLooks::BlockLooks(std::shared_ptr<const PackFiles> packs, std::shared_ptr<const PackFiles> own)
+    : packs_(std::move(packs)),
+      own_(std::move(own)),
+      all_(own_ == nullptr ? packs_
+                           : std::make_shared<PackStack>(std::vector<std::shared_ptr<const PackFiles>>{own_, packs_})),
+      library_(*packs_),
+      textures_(*all_) {
+  if (own_ != nullptr) own_library_.emplace(*own_);
+}
+
+void BlockLooks::note(std::string name, const std::string& reason) {
+  if (report_.names.size() < kMaxNames)
+    report_.names.push_back(std::move(name.append(" (").append(reason).append(")")));
+}
+
+VoxelProperties BlockLooks::applied(const VoxelProperties& type) {
+  if (!type.attributes.contains(minecraft::kStatesAttribute)) return type;
+  const std::scoped_lock lock(mutex_);
+  ++report_.types;
+  std::string reason = "not in the packs";
+  for (PackLibrary* const library : {&library_, own_library_ ? &*own_library_ : nullptr}) {
+    if (library == nullptr) continue;
+    auto made = Maker(*this, *library, type).make();
+    if (!made) {
+      reason = to_string(made.error());
+    } else if (*made) {
+      if (Status valid = validate_type(**made))
+        return std::move(**made);
+      else
+        reason = valid.error().message;
+    }
+  }
+  ++report_.without_look;
+  note(type.name, reason);
+  return type;
+}
+
+BlockPackReport BlockLooks::report() const {
+  const std::scoped_lock lock(mutex_);
+  return report_;
+}
+
+}  // namespace quoin::packs

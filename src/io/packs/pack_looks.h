@@ -1,0 +1,61 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+
+#include <quoin/core/result.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/io/block_packs.h>
+
+#include "io/packs/block_models.h"
+#include "io/packs/block_states.h"
+#include "io/packs/pack_files.h"
+#include "io/packs/pack_textures.h"
+
+// The looks of block types by resource packs.
+
+namespace quoin::packs {
+
+/// The block states and models of one pack. Textures may come from another.
+struct PackLibrary {
+  explicit PackLibrary(const PackFiles& files) : pack(files), models(files) {}
+
+  const PackFiles& pack;
+  ModelReader models;
+  std::map<std::string, Result<std::shared_ptr<const BlockStates>>> states{};  // by block; null: the pack has none
+
+  /// Returns the block states of a block; null if the pack does not have them. Errors: those of parse_block_states and
+  /// read_pack_json, with the file.
+  [[nodiscard]] Result<std::shared_ptr<const BlockStates>> states_of(const std::string& block);
+};
+
+/// Gives types their looks. Threads: any number may call all functions at once.
+class BlockLooks {
+ public:
+  /// `own`: looks of blocks for which `packs` have no model with elements, or null. Textures also come from it.
+  explicit BlockLooks(std::shared_ptr<const PackFiles> packs, std::shared_ptr<const PackFiles> own = nullptr);
+
+  /// Returns a type with its look; unchanged if it is no Minecraft block or no look is found.
+  [[nodiscard]] VoxelProperties applied(const VoxelProperties& type);
+  [[nodiscard]] BlockPackReport report() const;
+
+ private:
+  class Maker;
+  void note(std::string name, const std::string& reason);
+
+  std::shared_ptr<const PackFiles> packs_;
+  std::shared_ptr<const PackFiles> own_;
+  std::shared_ptr<const PackFiles> all_;  // for textures
+  mutable std::mutex mutex_;
+  PackLibrary library_;
+  std::optional<PackLibrary> own_library_;
+  TextureReader textures_;
+  std::set<std::string> missing_;  // textures, and models after a blank
+  BlockPackReport report_;
+};
+
+}  // namespace quoin::packs

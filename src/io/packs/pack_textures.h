@@ -1,0 +1,61 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <quoin/core/image.h>
+#include <quoin/core/result.h>
+#include <quoin/grid/texture.h>
+
+#include "io/packs/block_models.h"
+#include "io/packs/pack_files.h"
+
+// Textures of resource packs, decoded when a type first uses them.
+
+namespace quoin::packs {
+
+/// A texture with its use of alpha: cutout if nearly all texels are visible or invisible, else translucent.
+struct PackTexture {
+  Texture texture;
+  FaceAlpha alpha = FaceAlpha::Opaque;
+};
+
+/// Makes a texture of a PNG: its first frame, if `animation` is the text of its .mcmeta file with an animation. Images
+/// that are not square or whose side is no power of two from 16 to 1,024 are sampled by their nearest pixels.
+///
+/// Errors: BadFormat for images that are no PNG; LimitExceeded above 2^24 pixels, before it is decoded.
+[[nodiscard]] Result<PackTexture> texture_of_png(const std::string& name, std::span<const std::byte> png,
+                                                 std::string_view animation = {});
+
+/// One texture on a face of an element: the look, and the part that the face shows (ElementFace::part).
+struct FaceLayer {
+  VoxelFace look;
+  std::array<float, 4> part{0.0F, 0.0F, 16.0F, 16.0F};
+};
+
+/// Reads textures by name, each once. Threads: one at a time. Lifetime: the pack.
+class TextureReader {
+ public:
+  explicit TextureReader(const PackFiles& pack) : pack_(pack) {}
+
+  /// Returns a texture; null if the pack does not have it. Errors: those of texture_of_png and PackFiles::read, with
+  /// the file.
+  [[nodiscard]] Result<const PackTexture*> texture(const ResourceName& name);
+  /// Returns a texture of one opaque colour.
+  [[nodiscard]] const PackTexture& plain(Rgba8 colour);
+  /// Returns the layer that shows both: `upper` with its alpha over `lower`; or only `lower` if it is null. Its tint is
+  /// white and its texture shows a whole face, with turn 0.
+  [[nodiscard]] FaceLayer blended(const FaceLayer& lower, const FaceLayer* upper);
+
+ private:
+  const PackFiles& pack_;
+  std::map<std::string, Result<std::optional<PackTexture>>> known_;
+  std::map<std::string, PackTexture> made_;
+};
+
+}  // namespace quoin::packs

@@ -1,0 +1,145 @@
+#include "io/packs/state_conditions.h"
+
+#include <algorithm>
+#include <array>
+
+#include <quoin/core/assert.h>
+
+namespace quoin::packs {
+
+namespace {
+
+struct NamedSide {
+  std::string_view name;
+  Direction direction;
+};
+constexpr std::array<NamedSide, 4> kSides = {
+    {{"north", Direction::NegZ}, {"south", Direction::PosZ}, {"west", Direction::NegX}, {"east", Direction::PosX}}};
+
+const NamedSide* side_of(std::string_view property) {
+  const auto found = std::ranges::find(kSides, property, &NamedSide::name);
+  return found == kSides.end() ? nullptr : &*found;
+}
+
+constexpr int kMaxNegatedBits = 8;
+
+/// Returns true for blocks whose sides join their neighbours.
+bool joins_neighbours(std::string_view block) {
+  return std::ranges::any_of(
+      std::array<std::string_view, 6>{"fence", "_pane", "iron_bars", "copper_bars", "_wall", "redstone_wire"},
+      [&](std::string_view end) { return block.ends_with(end); });
+}
+
+bool contains_value(const StateTerm& term, std::string_view value) {
+  return (std::ranges::find(term.values, value) != term.values.end()) != term.is_negated;
+}
+
+}  // namespace
+
+TypeStates::TypeStates(const VoxelProperties& type) : fields_(minecraft::state_fields(type)) {
+  QUOIN_ASSERT(type.attributes.contains(minecraft::kStatesAttribute), "a type of a Minecraft block");
+  if (auto text = minecraft::parse_block(type.name)) {
+    block_ = std::move(text->name);
+    named_ = std::move(text->properties);
+  }
+  connects_ =
+      joins_neighbours(block_) && std::ranges::none_of(kSides, [&](const NamedSide& side) { return has(side.name); });
+}
+
+const minecraft::StateField* TypeStates::field(std::string_view property) const {
+  const auto found = std::ranges::find(fields_, property, &minecraft::StateField::key);
+  return found == fields_.end() ? nullptr : &*found;
+}
+
+bool TypeStates::has(std::string_view property) const {
+  return field(property) != nullptr ||
+         std::ranges::find(named_, property, &std::pair<std::string, std::string>::first) != named_.end();
+}
+
+bool TypeStates::holds_for_absent(const StateTerm& term) const {
+  std::vector<std::string_view> common;  // it may be any of them
+  if (const std::string_view word = minecraft::commonest_value(term.property); !word.empty()) common.push_back(word);
+  // A side of a fence is true or false, one of a wall none, low or tall.
+  if (common.empty() || side_of(term.property) != nullptr) common.insert(common.end(), {"false", "0"});
+  const auto is_met = [&](std::string_view value) { return contains_value(term, value); };
+  return term.is_negated ? std::ranges::all_of(common, is_met) : std::ranges::any_of(common, is_met);
+}
+
+Status TypeStates::restrict(std::vector<ShapeCondition>& all, const StateTerm& term) const {
+  const auto too_many = [] {
+    return make_error(ErrorCode::LimitExceeded,
+                      "more than " + std::to_string(kMaxTypeConditions) + " conditions of a block");
+  };
+  const minecraft::StateField* const found = field(term.property);
+  if (found == nullptr) {
+    const auto named = std::ranges::find(named_, term.property, &std::pair<std::string, std::string>::first);
+    const NamedSide* const side = connects_ ? side_of(term.property) : nullptr;
+    if (named == named_.end() && side != nullptr) {
+      const bool is_joined = std::ranges::any_of(std::array<std::string_view, 4>{"true", "side", "low", "up"},
+                                                 [&](std::string_view value) { return contains_value(term, value); });
+      const bool is_free = contains_value(term, "false") || contains_value(term, "none");
+      for (ShapeCondition& condition : all) {
+        if (is_joined && !is_free) condition.connected.insert(side->direction);
+        if (is_free && !is_joined) condition.unconnected.insert(side->direction);
+      }
+      if (!is_joined && !is_free) all.clear();
+      return {};
+    }
+    const bool is_met = named == named_.end() ? holds_for_absent(term) : contains_value(term, named->second);
+    if (!is_met) all.clear();
+    return {};
+  }
+  std::vector<std::uint32_t> codes;
+  for (const std::string& value : term.values) {
+    const auto code = minecraft::code_of_value(*found, value);
+    if (code && std::ranges::find(codes, *code) == codes.end()) codes.push_back(*code);
+  }
+  if (term.is_negated) {
+    if (found->bits > kMaxNegatedBits) return too_many();
+    std::vector<std::uint32_t> others;
+    for (std::uint32_t code = 0; code < 1U << found->bits; ++code) {
+      if (std::ranges::find(codes, code) == codes.end()) others.push_back(code);
+    }
+    codes = std::move(others);
+  }
+  if (codes.size() * all.size() > kMaxTypeConditions) return too_many();
+  std::vector<ShapeCondition> restricted;
+  for (const ShapeCondition& condition : all) {
+    for (const std::uint32_t code : codes) {
+      const std::uint32_t mask = mask_of(*found);
+      const std::uint32_t bits = code << found->first_bit;
+      if ((condition.state_mask & mask) == mask && (condition.state & mask) != bits) continue;
+      ShapeCondition narrower = condition;
+      narrower.state_mask |= mask;
+      narrower.state |= bits;
+      restricted.push_back(narrower);
+    }
+  }
+  all = std::move(restricted);
+  return {};
+}
+
+Result<std::vector<ShapeCondition>> TypeStates::conditions(const StateCase& of) const {
+  std::vector<ShapeCondition> all;
+  for (const std::vector<StateTerm>& terms : of.when) {
+    std::vector<ShapeCondition> met(1);
+    for (const StateTerm& term : terms) {
+      if (auto done = restrict(met, term); !done) return done.error();
+    }
+    const auto is_contradiction = [](const ShapeCondition& each) {
+      return (each.connected.bits() & each.unconnected.bits()) != 0;
+    };
+    std::erase_if(met, is_contradiction);
+    if (all.size() + met.size() > kMaxTypeConditions) {
+      return make_error(ErrorCode::LimitExceeded,
+                        "more than " + std::to_string(kMaxTypeConditions) + " conditions of a block");
+    }
+    for (const ShapeCondition& each : met) {
+      if (each == ShapeCondition{}) return std::vector<ShapeCondition>(1);
+      if (std::ranges::find(all, each) == all.end()) all.push_back(each);
+    }
+  }
+  return all;
+}
+
+}  // namespace quoin::packs

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <quoin/core/result.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/grid/voxel_shape.h>
+
+#include "io/minecraft/block_types.h"
+#include "io/packs/block_states.h"
+
+// Conditions of block states as conditions of a type's state bits.
+
+namespace quoin::packs {
+
+/// Maximum number of conditions of a type.
+inline constexpr std::size_t kMaxTypeConditions = 8'192;
+
+/// The properties of a block type: those in its name, and those in its state bits.
+class TypeStates {
+ public:
+  /// Reads the name and the fields of a type. Requires: the type has the attribute kStatesAttribute.
+  explicit TypeStates(const VoxelProperties& type);
+
+  /// Returns the name without properties: "minecraft:oak_stairs"; empty if it cannot be parsed.
+  [[nodiscard]] const std::string& block() const { return block_; }
+  [[nodiscard]] const minecraft::StateField* field(std::string_view property) const;
+  /// Returns true if the name or the state has the property.
+  [[nodiscard]] bool has(std::string_view property) const;
+
+  /// Returns the conditions under which a case holds: none if it never does, and one without bits if it always does.
+  /// Properties that the type does not have take the value that is commonest in the game. Sides of fences, panes and
+  /// the like that the type does not have become connections with neighbours (ShapeNeighbours::Connected).
+  /// Errors: LimitExceeded for kMaxTypeConditions.
+  [[nodiscard]] Result<std::vector<ShapeCondition>> conditions(const StateCase& of) const;
+
+  /// Returns true if conditions may depend on connections, since the type lacks its sides.
+  [[nodiscard]] bool connects() const { return connects_; }
+
+ private:
+  [[nodiscard]] Status restrict(std::vector<ShapeCondition>& all, const StateTerm& term) const;
+  [[nodiscard]] bool holds_for_absent(const StateTerm& term) const;
+
+  std::string block_;
+  std::vector<std::pair<std::string, std::string>> named_;  // properties in the name
+  std::vector<minecraft::StateField> fields_;
+  bool connects_ = false;
+};
+
+/// Returns true if a state satisfies a condition, apart from connections.
+[[nodiscard]] inline bool holds(const ShapeCondition& condition, std::uint32_t state) {
+  return (state & condition.state_mask) == condition.state;
+}
+
+/// Returns the mask of a field's bits.
+[[nodiscard]] inline std::uint32_t mask_of(const minecraft::StateField& field) {
+  return static_cast<std::uint32_t>(((std::uint64_t{1} << field.bits) - 1U) << field.first_bit);
+}
+
+}  // namespace quoin::packs
