@@ -21,7 +21,7 @@ inline constexpr std::size_t kMaxStateAlternatives = 1'024;
 
 /// A model as a block state shows it.
 struct StateModel {
-  std::string model;
+  std::string model{};
   int x = 0;  ///< quarter turns about x, then about y, clockwise seen from the positive end of the axis
   int y = 0;
   bool keeps_uv = false;  ///< textures keep their place in the world when the model is turned

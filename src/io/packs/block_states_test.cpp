@@ -140,7 +140,7 @@ TEST(BlockStates, LimitsProducts) {
     const std::string key = "k" + std::to_string(i);
     pairs += (i == 0 ? "" : ",") + (R"({"OR": [{")" + key + R"(": "a"}, {")" + key + R"(": "b"}]})");
   }
-  EXPECT_NE(states_error(R"({"multipart": [{"apply": {"model": "a"}, "when": {"AND": [)" + pairs + "]}}]})"), "");
+  EXPECT_NE(states_error(R"({"multipart": [{"apply": {"model": "a"}, "when": {"AND": [)" + pairs + "]}}]}"), "");
   std::string deep = R"({"a": "b"})";
   for (int i = 0; i < 10; ++i) deep = R"({"OR": [)" + deep + "]}";
   EXPECT_NE(states_error(R"({"multipart": [{"apply": {"model": "a"}, "when": )" + deep + "}]}"), "");

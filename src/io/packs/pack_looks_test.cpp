@@ -1,0 +1,390 @@
+#include "io/packs/pack_looks.h"
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "io/packs/pack_shapes.h"
+#include "io/packs/packs_for_tests.h"
+
+namespace quoin::packs {
+namespace {
+
+using packs_test::block;
+using packs_test::PackBuilder;
+using packs_test::TypeAndState;
+
+constexpr Rgba8 kRed{200, 20, 20};
+constexpr Rgba8 kGreen{20, 200, 20};
+constexpr Rgba8 kClear{0, 0, 0, 0};
+
+// Adds blocks with one model in all states.
+void add_block(PackBuilder& pack, const std::string& name, const std::string& model) {
+  pack.model("block/" + name, model);
+  pack.states(name, R"({"variants": {"": {"model": "block/)" + name + "\"}}}");
+}
+
+PackBuilder small_pack() {
+  PackBuilder pack;
+  packs_test::add_parents(pack);
+  pack.texture("block/red", packs_test::plain_png(kRed));
+  pack.texture("block/green", packs_test::plain_png(kGreen));
+  pack.texture("block/leaf", packs_test::png(16, [](int x, int y) { return (x + y) % 2 == 0 ? kGreen : kClear; }));
+  pack.texture("block/glass", packs_test::plain_png({100, 100, 200, 120}));
+  add_block(pack, "stone", R"({"parent": "block/cube_all", "textures": {"all": "block/red"}})");
+  add_block(pack, "oak_leaves", R"({"parent": "block/cube_all", "textures": {"all": "block/leaf"}})");
+  add_block(pack, "blue_stained_glass", R"({"parent": "block/cube_all", "textures": {"all": "block/glass"}})");
+  return pack;
+}
+
+VoxelProperties look(const PackBuilder& pack, const VoxelProperties& type) {
+  return BlockLooks(pack.files()).applied(type);
+}
+
+BlockPackReport report_of(const PackBuilder& pack, const VoxelProperties& type) {
+  BlockLooks looks(pack.files());
+  EXPECT_TRUE(validate_type(looks.applied(type)));
+  return looks.report();
+}
+
+// Returns the directions in which a type in a state shows a texture.
+DirectionSet shows(const VoxelProperties& type, std::uint32_t state, const std::string& texture) {
+  DirectionSet found;
+  for (const Direction direction : kDirections) {
+    if (turned_face(type.faces, direction, type.orientations.of(state)).texture.name() == texture)
+      found.insert(direction);
+  }
+  return found;
+}
+
+const ShapeModel& shape_of(const VoxelProperties& type, std::uint32_t state) {
+  return type.shapes.model(state, type.orientations.of(state), {});
+}
+
+TEST(PackLooks, CubesHaveFacesAndStayOpaque) {
+  const VoxelProperties stone = look(small_pack(), block("minecraft:stone").type);
+  ASSERT_FALSE(stone.faces.empty());
+  EXPECT_TRUE(stone.shapes.empty());
+  EXPECT_TRUE(stone.orientations.empty());
+  EXPECT_EQ(stone.visibility, Visibility::Opaque);
+  EXPECT_EQ(stone.faces[Direction::PosY].texture.name(), "minecraft:block/red");
+  VoxelRegistry types;
+  const auto added = types.add(stone);
+  ASSERT_TRUE(added);
+  EXPECT_EQ(types[*added].colour, kRed) << "the mean of its textures";
+}
+
+TEST(PackLooks, AlphaFollowsTexels) {
+  const PackBuilder pack = small_pack();
+  const VoxelProperties leaves = look(pack, block("minecraft:oak_leaves").type);
+  EXPECT_EQ(leaves.visibility, Visibility::Transparent);
+  EXPECT_EQ(leaves.faces[Direction::PosX].alpha, FaceAlpha::Cutout);
+  const VoxelProperties glass = look(pack, block("minecraft:blue_stained_glass").type);
+  EXPECT_EQ(glass.faces[Direction::PosX].alpha, FaceAlpha::Translucent);
+}
+
+TEST(PackLooks, OrientationsFollowStates) {
+  PackBuilder pack = small_pack();
+  pack.model("block/furnace", R"({"parent": "block/cube", "textures": {"north": "block/green", "south": "block/red",
+    "west": "block/red", "east": "block/red", "up": "block/red", "down": "block/red"}})");
+  pack.states(
+      "furnace",
+      R"({"variants": {"facing=north": {"model": "block/furnace"}, "facing=east": {"model": "block/furnace", "y": 90},
+    "facing=south": {"model": "block/furnace", "y": 180}, "facing=west": {"model": "block/furnace", "y": 270}}})");
+  pack.states(
+      "observer",
+      R"({"variants": {"facing=up": {"model": "block/furnace", "x": 270}, "facing=down": {"model": "block/furnace", "x": 90}}})");
+  const std::vector<std::pair<std::string, Direction>> facings = {
+      {"north", Direction::NegZ}, {"east", Direction::PosX}, {"south", Direction::PosZ}, {"west", Direction::NegX}};
+  for (const auto& [facing, direction] : facings) {
+    const TypeAndState furnace = block("minecraft:furnace", {{"facing", facing}, {"lit", "false"}});
+    const VoxelProperties made = look(pack, furnace.type);
+    ASSERT_TRUE(made.shapes.empty());
+    EXPECT_EQ(shows(made, furnace.state, "minecraft:block/green"), DirectionSet{direction}) << facing;
+  }
+  for (const bool is_up : {false, true}) {
+    const TypeAndState observer =
+        block("minecraft:observer", {{"facing", is_up ? "up" : "down"}, {"powered", "false"}});
+    const VoxelProperties made = look(pack, observer.type);
+    EXPECT_EQ(shows(made, observer.state, "minecraft:block/green"),
+              DirectionSet{is_up ? Direction::PosY : Direction::NegY});
+  }
+}
+
+TEST(PackLooks, ShapesFollowStates) {
+  PackBuilder pack = small_pack();
+  const std::string textures = R"("textures": {"top": "block/red", "bottom": "block/red", "side": "block/green"})";
+  pack.model("block/oak_slab", R"({"parent": "block/slab", )" + textures + "}");
+  pack.model("block/oak_slab_top",
+             R"({"elements": [{"from": [0, 8, 0], "to": [16, 16, 16], "faces": {"up": {"texture": "block/red"}}}]})");
+  pack.model("block/oak_planks", R"({"parent": "block/cube_all", "textures": {"all": "block/red"}})");
+  pack.states("oak_slab",
+              R"({"variants": {"type=bottom": {"model": "block/oak_slab"}, "type=top": {"model": "block/oak_slab_top"},
+    "type=double": {"model": "block/oak_planks"}}})");
+  const auto model = [&](const char* type) {
+    const TypeAndState slab = block("minecraft:oak_slab", {{"type", type}, {"waterlogged", "false"}});
+    const VoxelProperties made = look(pack, slab.type);
+    EXPECT_EQ(made.visibility, Visibility::Opaque);
+    return std::pair(shape_of(made, slab.state).min, shape_of(made, slab.state).max);
+  };
+  EXPECT_EQ(model("bottom"), std::pair(Vec3(0.0F), Vec3(1.0F, 0.5F, 1.0F)));
+  EXPECT_EQ(model("top"), std::pair(Vec3(0.0F, 0.5F, 0.0F), Vec3(1.0F)));
+  EXPECT_EQ(model("double"), std::pair(Vec3(0.0F), Vec3(1.0F)));
+}
+
+TEST(PackLooks, CombinesPartsOfFences) {
+  PackBuilder pack = small_pack();
+  const std::string textures = R"("textures": {"top": "block/red", "bottom": "block/red", "side": "block/red"})";
+  pack.model("block/post", R"({"parent": "block/fence_post", )" + textures + "}");
+  pack.model("block/side", R"({"parent": "block/fence_side", )" + textures + "}");
+  pack.states("oak_fence", R"({"multipart": [{"apply": {"model": "block/post"}},
+    {"when": {"north": "true"}, "apply": {"model": "block/side", "uvlock": true}},
+    {"when": {"east": "true"}, "apply": {"model": "block/side", "y": 90, "uvlock": true}},
+    {"when": {"south": "true"}, "apply": {"model": "block/side", "y": 180, "uvlock": true}},
+    {"when": {"west": "true"}, "apply": {"model": "block/side", "y": 270, "uvlock": true}}]})");
+  const TypeAndState fence =
+      block("minecraft:oak_fence", {{"north", "false"}, {"south", "false"}, {"west", "false"}, {"east", "true"}});
+  const VoxelProperties made = look(pack, fence.type);
+  const ShapeModel& model = shape_of(made, fence.state);
+  EXPECT_EQ(model.boxes.size(), 3U);
+  EXPECT_EQ(model.min, Vec3(0.375F, 0.0F, 0.375F));
+  EXPECT_EQ(model.max, Vec3(1.0F, 1.0F, 0.625F));
+  // Without sides in the state, neighbours count.
+  const VoxelProperties old = look(pack, block("minecraft:oak_fence").type);
+  EXPECT_EQ(old.shapes.rules().neighbours, ShapeNeighbours::Connected);
+  EXPECT_EQ(old.shapes.model(0, {}, {.connected = {Direction::NegX}}).max.x, 0.625F);
+  EXPECT_EQ(old.shapes.model(0, {}, {.connected = {Direction::NegX}}).min.x, 0.0F);
+}
+
+TEST(PackLooks, BlendsOverlaysWithTints) {
+  PackBuilder pack = small_pack();
+  pack.texture("block/grey", packs_test::plain_png({255, 255, 255}));
+  pack.texture("block/over", packs_test::png(16, [](int, int y) { return y < 8 ? Rgba8{255, 255, 255} : kClear; }));
+  const std::string sides =
+      R"("north": {"texture": "#s"}, "south": {"texture": "#s"}, "west": {"texture": "#s"}, "east": {"texture": "#s"})";
+  std::string tinted = sides;
+  for (std::size_t at = tinted.find("#s\""); at != std::string::npos; at = tinted.find("#s\"", at + 1)) {
+    tinted.replace(at, 3, "#over\", \"tintindex\": 0");
+  }
+  add_block(pack, "grass_block",
+            R"({"textures": {"s": "block/red", "over": "block/over", "top": "block/grey"}, "elements": [
+    {"from": [0, 0, 0], "to": [16, 16, 16], "faces": {)" +
+                sides + R"(, "down": {"texture": "#s"}, "up": {"texture": "#top", "tintindex": 0}}},
+    {"from": [0, 0, 0], "to": [16, 16, 16], "faces": {)" +
+                tinted + "}}]}");
+  minecraft::BiomeTints tints;
+  tints.grass = 0x30C040;
+  const VoxelProperties grass = look(pack, block("minecraft:grass_block", {{"snowy", "false"}}, tints).type);
+  ASSERT_FALSE(grass.faces.empty());
+  EXPECT_TRUE(grass.shapes.empty()) << "one cube";
+  EXPECT_EQ(grass.faces[Direction::PosY].tint, (Rgba8{0x30, 0xC0, 0x40}));
+  const VoxelFace& side = grass.faces[Direction::PosX];
+  EXPECT_EQ(side.alpha, FaceAlpha::Opaque);
+  EXPECT_EQ(side.texture.level(0)[0], (Rgba8{0x30, 0xC0, 0x40}));
+  EXPECT_EQ(side.texture.level(0)[8 * 16], kRed);
+}
+
+TEST(PackLooks, FluidsHaveHeights) {
+  PackBuilder pack = small_pack();
+  pack.texture("block/water_still", packs_test::png(
+                                        16,
+                                        [](int, int y) {
+                                          return y < 16 ? Rgba8{200, 200, 200, 180} : kRed;
+                                        },
+                                        4));
+  pack.put("textures/block/water_still.png.mcmeta", R"({"animation": {"frametime": 2}})");
+  pack.texture("block/water_flow", packs_test::png(32, [](int x, int y) {
+                 return x < 16 && y < 16 ? Rgba8{100, 100, 100, 180} : kRed;
+               }));
+  const TypeAndState water = block("minecraft:water", {{"level", "3"}});
+  const VoxelProperties made = look(pack, water.type);
+  ASSERT_FALSE(made.shapes.empty());
+  EXPECT_EQ(made.shapes.rules().neighbours, ShapeNeighbours::Fluid);
+  EXPECT_EQ(water.state & 7U, 3U);
+  EXPECT_EQ(made.visibility, Visibility::Transparent);
+  EXPECT_EQ(made.faces[Direction::PosY].texture.size(), 16);
+  EXPECT_EQ(made.faces[Direction::PosY].texture.level(0)[255], (Rgba8{200, 200, 200, 180})) << "the first frame";
+  EXPECT_EQ(made.faces[Direction::PosX].texture.size(), 16);
+  EXPECT_EQ(made.faces[Direction::PosX].texture.level(0)[255], (Rgba8{100, 100, 100, 180})) << "a quarter of the image";
+  EXPECT_EQ(made.faces[Direction::PosX].tint, (Rgba8{0x3F, 0x76, 0xE4}));
+}
+
+TEST(PackLooks, WiresAreColouredByPower) {
+  PackBuilder pack = small_pack();
+  pack.states("redstone_wire", R"({"multipart": [{"apply": {"model": "block/dot"}}]})");
+  pack.model(
+      "block/dot",
+      R"({"elements": [{"from": [0, 0.25, 0], "to": [16, 0.25, 16], "faces": {"up": {"texture": "block/red", "tintindex": 0}}}]})");
+  const auto tint = [&](const char* power) {
+    const TypeAndState wire = block("minecraft:redstone_wire", {{"power", power}});
+    const VoxelProperties made = look(pack, wire.type);
+    const ShapeModel& model = shape_of(made, wire.state);
+    return model.faces.size() == 1 ? look_of(model, model.faces[0], made.faces)->tint : Rgba8{};
+  };
+  EXPECT_EQ(tint("0"), (Rgba8{76, 0, 0}));
+  EXPECT_EQ(tint("15"), (Rgba8{255, 50, 0}));
+}
+
+TEST(PackLooks, TexturesOfOldPacksAreFound) {
+  auto below = std::make_shared<MemoryPack>();
+  auto above = std::make_shared<MemoryPack>();
+  below->put("assets/minecraft/textures/block/stone.png", packs_test::plain_png(kRed));
+  above->put("assets/minecraft/textures/blocks/stone.png", packs_test::plain_png(kGreen));
+  below->put("assets/minecraft/blockstates/stone.json", R"({"variants": {"normal": {"model": "stone"}}})");
+  below->put("assets/minecraft/models/block/stone.json", R"({"elements": [{"from": [0, 0, 0], "to": [16, 16, 16],
+    "faces": {"up": {"texture": "block/stone"}}}]})");
+  BlockLooks looks(std::make_shared<PackStack>(std::vector<std::shared_ptr<const PackFiles>>{below, above}));
+  const VoxelProperties stone = looks.applied(block("minecraft:stone").type);
+  ASSERT_FALSE(stone.faces.empty());
+  EXPECT_EQ(stone.faces[Direction::PosY].texture.level(0)[0], kGreen);
+}
+
+TEST(PackLooks, ReportsMissingParts) {
+  PackBuilder pack = small_pack();
+  EXPECT_EQ(report_of(pack, block("minecraft:stone").type).without_look, 0U);
+  EXPECT_EQ(to_string(report_of(pack, block("minecraft:stone").type)), "");
+  EXPECT_EQ(report_of(pack, VoxelProperties{.name = "minecraft:stone"}).types, 0U) << "not of a Minecraft file";
+  const BlockPackReport absent = report_of(pack, block("minecraft:dirt").type);
+  EXPECT_EQ(to_string(absent), "resource packs: 1 block type of 1 without a look: minecraft:dirt (not in the packs)");
+  add_block(pack, "sand", R"({"parent": "block/cube_all", "textures": {"all": "block/sand"}})");
+  const BlockPackReport untextured = report_of(pack, block("minecraft:sand").type);
+  EXPECT_EQ(untextured.missing_textures, 1U);
+  EXPECT_EQ(untextured.without_look, 0U);
+  pack.texture("block/sand", std::string("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x40\0\0\0\x40\0\x08\6\0\0\0", 29));
+  const BlockPackReport large = report_of(pack, block("minecraft:sand").type);
+  ASSERT_EQ(large.names.size(), 1U);
+  EXPECT_NE(large.names[0].find("16384 x 16384"), std::string::npos) << large.names[0];
+  pack.states("clay", R"({"variants": {"": {"model": "block/none"}}})");
+  EXPECT_EQ(report_of(pack, block("minecraft:clay").type).missing_models, 1U);
+  pack.states("gravel", "[");
+  const BlockPackReport broken = report_of(pack, block("minecraft:gravel").type);
+  ASSERT_EQ(broken.names.size(), 1U);
+  EXPECT_NE(broken.names[0].find("assets/minecraft/blockstates/gravel.json"), std::string::npos);
+}
+
+TEST(PackLooks, SplitsModelsOfManyElements) {
+  PackBuilder pack = small_pack();
+  const auto boxes = [](int count) {
+    std::string all;
+    for (int i = 0; i < count; ++i) {
+      all += (i == 0 ? "" : ", ") +
+             (R"({"from": [0, )" + std::to_string(i % 15) + R"(, 0], "to": [)" + std::to_string(1 + i % 16)) +
+             R"(, 15.5, 16], "faces": {"up": {"texture": "block/red"}}})";
+    }
+    return R"({"elements": [)" + all + "]}";
+  };
+  add_block(pack, "anvil", boxes(200));
+  const VoxelProperties anvil = look(pack, block("minecraft:anvil").type);
+  ASSERT_FALSE(anvil.shapes.empty());
+  EXPECT_EQ(anvil.shapes.rules().parts.size(), 2U);
+  add_block(pack, "anvil", boxes(600));
+  EXPECT_EQ(report_of(pack, block("minecraft:anvil").type).without_look, 1U);
+}
+
+TEST(PackLooks, OwnPackFillsModelsThatTheGameDraws) {
+  PackBuilder pack = small_pack();
+  add_block(pack, "chest", R"({"parent": "builtin/entity", "textures": {"particle": "block/red"}})");
+  EXPECT_EQ(report_of(pack, block("minecraft:chest").type).without_look, 1U);
+  PackBuilder own;
+  add_block(own, "chest",
+            R"({"elements": [{"from": [1, 0, 1], "to": [15, 14, 15], "faces": {"up": {"texture": "block/red"}}}]})");
+  BlockLooks looks(pack.files(), own.files());
+  const VoxelProperties chest = looks.applied(block("minecraft:chest").type);
+  ASSERT_FALSE(chest.shapes.empty());
+  EXPECT_EQ(chest.faces[Direction::PosY].texture.name(), "minecraft:block/red") << "a texture of the other pack";
+  EXPECT_EQ(looks.report().without_look, 0U);
+}
+
+TEST(PackShapes, DefaultTexturesStayWhenTheModelTurns) {
+  PackElement cube;
+  for (auto& face : cube.faces) face = PackFace{.texture = "#all"};
+  PackElement box = cube;
+  box.from = {1.0F, 2.0F, 3.0F};
+  box.to = {9.0F, 12.0F, 16.0F};
+  for (int x = 0; x < 4; ++x) {
+    for (int y = 0; y < 4; ++y) {
+      const AxisOrientation turn = orientation_of({.x = x, .y = y});
+      const PackElement turned = turned_with_world(cube, turn);
+      for (const auto& face : turned.faces) {
+        EXPECT_EQ(face->turn, 0) << x << ", " << y;
+        EXPECT_EQ(face->uv, (std::array<float, 4>{0.0F, 0.0F, 16.0F, 16.0F}));
+      }
+      // A box shows the part at its place, which the identity gives.
+      const PackElement moved = turned_with_world(box, turn);
+      PackElement plain = moved;
+      for (auto& face : plain.faces) face->uv.reset();
+      const PackElement expected = turned_with_world(plain, {});
+      for (std::size_t i = 0; i < 6; ++i) {
+        EXPECT_EQ(moved.faces[i]->uv, expected.faces[i]->uv) << x << ", " << y << ", face " << i;
+        EXPECT_EQ(moved.faces[i]->turn, 0);
+      }
+      const PackElement back = turned_with_world(moved, turn.inverse());
+      EXPECT_EQ(back.from, box.from);
+      EXPECT_EQ(back.to, box.to);
+    }
+  }
+}
+
+TEST(PackShapes, PartsOfTexturesTurnWithTheWorld) {
+  // A quarter turn about y moves the left half of the top to its upper half.
+  PackElement plate;
+  plate.faces[2] = PackFace{.texture = "#t", .uv = std::array<float, 4>{0.0F, 0.0F, 8.0F, 16.0F}};
+  plate.to = {8.0F, 16.0F, 16.0F};
+  const PackElement turned = turned_with_world(plate, orientation_of({.y = 1}));
+  EXPECT_EQ(turned.from, Vec3(0.0F));
+  EXPECT_EQ(turned.to, Vec3(16.0F, 16.0F, 8.0F));
+  EXPECT_EQ(turned.faces[2]->uv, (std::array<float, 4>{0.0F, 0.0F, 16.0F, 8.0F}));
+  EXPECT_EQ(turned.faces[2]->turn, 0);
+}
+
+TEST(PackTextures, TakesTheFirstFrame) {
+  const auto two = [](int, int y) { return y < 16 ? kRed : kGreen; };
+  const std::string image = packs_test::png(16, two, 2);
+  const auto bytes = std::as_bytes(std::span(image));
+  const auto first = texture_of_png("a", bytes, R"({"animation": {}})");
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->texture.level(0)[0], kRed);
+  EXPECT_EQ(first->texture.level(0)[255], kRed);
+  const auto second = texture_of_png("a", bytes, R"({"animation": {"frames": [1, 0]}})");
+  EXPECT_EQ(second->texture.level(0)[0], kGreen);
+  const auto whole = texture_of_png("a", bytes);
+  EXPECT_EQ(whole->texture.size(), 32);
+  EXPECT_EQ(whole->texture.level(0)[0], kRed);
+  EXPECT_EQ(whole->texture.level(0)[32 * 31], kGreen);
+  for (const char* odd : {"[", "{}", R"({"animation": 1})", R"({"animation": {"frames": [{"index": -3}]}})",
+                          R"({"animation": {"width": 0, "height": 99999}})", R"({"animation": {"frames": [7]}})"}) {
+    EXPECT_TRUE(texture_of_png("a", bytes, odd)) << odd;
+  }
+}
+
+TEST(PackTextures, AcceptsOtherSizesAndRejectsOtherFiles) {
+  const std::string small = packs_test::plain_png(kRed, 8);
+  EXPECT_EQ(texture_of_png("a", std::as_bytes(std::span(small)))->texture.size(), 16);
+  const std::string odd = packs_test::plain_png(kRed, 48);
+  EXPECT_EQ(texture_of_png("a", std::as_bytes(std::span(odd)))->texture.size(), 64);
+  EXPECT_FALSE(texture_of_png("a", {}));
+  EXPECT_FALSE(texture_of_png("a", std::as_bytes(std::span(small)).first(40)));
+  const std::string nearly = packs_test::plain_png({1, 2, 3, 252});
+  EXPECT_EQ(texture_of_png("a", std::as_bytes(std::span(nearly)))->alpha, FaceAlpha::Opaque);
+}
+
+TEST(BlockPacks, AppliesToRegistries) {
+  VoxelRegistry types;
+  const VoxelProperties stone = block("minecraft:stone").type;
+  ASSERT_TRUE(types.add({.name = "other", .colour = kGreen}));
+  const auto type = types.add(stone);
+  const auto packs = BlockPacks::open(std::vector<std::vector<std::byte>>{});
+  ASSERT_TRUE(packs);
+  (*packs)->apply(types);
+  EXPECT_EQ(types[*type], stone) << "no pack has it";
+  EXPECT_EQ((*packs)->report().without_look, 1U);
+  EXPECT_EQ((*packs)->report().types, 1U);
+}
+
+}  // namespace
+}  // namespace quoin::packs
