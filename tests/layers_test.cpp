@@ -61,8 +61,8 @@ constexpr int kSmallFile = 60;
 constexpr int kMaxLines = 900;
 // Numbers of C++ files without tests in src, include and apps. They only rise for a new subject, such as a format: a
 // change that merges files lowers them.
-constexpr int kMaxSources = 699;
-constexpr int kMaxSmallSources = 81;
+constexpr int kMaxSources = 715;
+constexpr int kMaxSmallSources = 83;
 
 // A folder with more files should be split.
 constexpr int kMaxFiles = 32;

@@ -36,7 +36,7 @@ struct StateTerm {
 
 /// A model and the condition under which a block shows it.
 struct StateCase {
-  /// One of these alternatives must hold, of which all terms must hold. An alternative without terms always holds.
+  /// The case holds if any of these alternatives does. An alternative holds if all its terms do; without terms, always.
   std::vector<std::vector<StateTerm>> when;
   /// Models to choose from by position. Their weights are not kept: the heaviest is the first.
   std::vector<StateModel> models;

@@ -68,7 +68,7 @@ class MemoryPack final : public PackFiles {
   std::map<std::string, std::string, std::less<>> files_;
 };
 
-/// Packs of which later ones override earlier ones, file by file. Textures of blocks are found in the folders
+/// A list of packs: later ones override earlier ones, file by file. Textures of blocks are found in the folders
 /// textures/block and textures/blocks, by either name, since 1.13 renamed it.
 class PackStack final : public PackFiles {
  public:

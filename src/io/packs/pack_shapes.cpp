@@ -23,7 +23,7 @@ std::uint8_t published_turn(Direction direction) {
   return direction == Direction::PosY ? 3 : 0;
 }
 
-/// Returns the turn with which a texture has these axes on a face. Requires: there is one.
+/// Returns the turn that gives a texture these axes on a face. Requires: there is one.
 std::uint8_t turn_of_frame(const TextureFrame& frame, Direction direction) {
   for (std::uint8_t turn = 0; turn < 4; ++turn) {
     if (texture_frame({.turn = turn}, direction) == frame) return turn;
