@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <map>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -394,6 +395,10 @@ class BlockLooks::Maker {
       rules.connects_to_full_sides = name_ != "redstone_wire";
     }
     std::vector<std::vector<ShapeElement>> all;
+    if (states_.has_corners() && !is_multipart_) {
+      if (auto done = add_stairs(made, rules, all); !done) return done.error();
+      return with_shapes(std::move(made), std::move(rules), all);
+    }
     const auto turns = !is_multipart_ && is_one_model() ? orientations() : std::nullopt;
     if (turns) {
       made.orientations = *turns;
@@ -411,6 +416,66 @@ class BlockLooks::Maker {
         if (auto done = add_parts(outcome, all.back(), remaining_turn(outcome), rules); !done) return done.error();
       }
     }
+    return with_shapes(std::move(made), std::move(rules), all);
+  }
+
+  /// Adds the parts of stairs whose corners follow their neighbours. These are found in the space of unturned stairs,
+  /// so the type has orientations, and parts are turned back by the orientations of their states.
+  Status add_stairs(VoxelProperties& made, ShapeRules& rules, std::vector<std::vector<ShapeElement>>& all) {
+    rules.neighbours = ShapeNeighbours::Stairs;
+    const minecraft::StateField& facing = *states_.field("facing");
+    const minecraft::StateField& half = *states_.field("half");
+    const std::uint32_t both = mask_of(facing) | mask_of(half);
+    const auto is_top = [&](std::uint32_t state) {
+      return minecraft::value_of_code(half, (state & mask_of(half)) >> half.first_bit) == "top";
+    };
+    made.orientations.first_bit = static_cast<std::uint8_t>(facing.first_bit);
+    for (std::uint32_t value = 0; value <= both >> facing.first_bit; ++value) {
+      const std::uint32_t state = value << facing.first_bit;
+      const std::string name = minecraft::value_of_code(facing, value & (mask_of(facing) >> facing.first_bit));
+      // East is the unturned one. Counter-clockwise, seen from above:
+      constexpr std::array<std::string_view, 4> kFacings = {"east", "north", "west", "south"};
+      const auto quarter = std::ranges::find(kFacings, name) - kFacings.begin();
+      made.orientations.by_value.push_back(AxisOrientation::quarter_turns(1, static_cast<int>(quarter)) *
+                                           AxisOrientation::quarter_turns(0, is_top(state) ? 2 : 0));
+    }
+    for (const Outcome& outcome : outcomes_) {
+      all.push_back(elements(outcome));
+      std::map<int, Outcome> by_turn;
+      for (ShapeCondition condition : outcome.when) {
+        if ((condition.state_mask & both) != both) {
+          return make_error(ErrorCode::Unsupported, "a variant of stairs without facing or half");
+        }
+        // The half turn of upper stairs exchanges the sides.
+        if (is_top(condition.state) && condition.corner) condition.corner = mirrored(*condition.corner);
+        Outcome& part = by_turn[made.orientations.of(condition.state).index()];
+        part.when.push_back(condition);
+      }
+      for (const auto& [turn, part] : by_turn) {
+        const AxisOrientation back = AxisOrientation::at(turn).inverse();
+        if (auto done = add_parts(part, all.back(), back * remaining_turn(outcome), rules); !done) return done;
+      }
+    }
+    return {};
+  }
+
+  static StairCorner mirrored(StairCorner corner) {
+    switch (corner) {
+      case StairCorner::OuterLeft:
+        return StairCorner::OuterRight;
+      case StairCorner::OuterRight:
+        return StairCorner::OuterLeft;
+      case StairCorner::InnerLeft:
+        return StairCorner::InnerRight;
+      case StairCorner::InnerRight:
+        return StairCorner::InnerLeft;
+      default:
+        return corner;
+    }
+  }
+
+  Result<VoxelProperties> with_shapes(VoxelProperties made, ShapeRules rules,
+                                      const std::vector<std::vector<ShapeElement>>& all) const {
     auto shapes = VoxelShapes::from_rules(std::move(rules));
     if (!shapes) return shapes.error();
     made.shapes = std::move(*shapes);

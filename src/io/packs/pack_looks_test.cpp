@@ -161,6 +161,71 @@ TEST(PackLooks, CombinesPartsOfFences) {
   EXPECT_EQ(old.shapes.model(0, {}, {.connected = {Direction::NegX}}).min.x, 0.0F);
 }
 
+// Variants of stairs as packs have them: a model for straight stairs and one for each kind of corner.
+std::string variants_of_stairs() {
+  std::string all;
+  const std::array<const char*, 4> facings = {"east", "south", "west", "north"};
+  for (int facing = 0; facing < 4; ++facing) {
+    for (const bool is_top : {false, true}) {
+      for (const std::string shape : {"straight", "inner_left", "inner_right", "outer_left", "outer_right"}) {
+        int y = facing;
+        if (shape.ends_with("left") && !is_top) y += 3;
+        if (shape.ends_with("right") && is_top) y += 1;
+        const std::string model = shape.substr(0, shape.find('_'));
+        all += (all.empty() ? "" : ", ") + std::string("\"facing=") + facings[static_cast<std::size_t>(facing)] +
+               ",half=" + (is_top ? "top" : "bottom") + ",shape=" + shape + R"(": {"model": "block/)" + model +
+               R"(", "uvlock": true, "x": )" + (is_top ? "180" : "0") + R"(, "y": )" + std::to_string(90 * (y % 4)) +
+               "}";
+      }
+    }
+  }
+  return R"({"variants": {)" + all + "}}";
+}
+
+TEST(PackLooks, StairsOfOldWorldsFollowNeighbours) {
+  PackBuilder pack = small_pack();
+  const auto model = [&](const std::string& name, const std::string& more) {
+    pack.model("block/" + name,
+               R"({"elements": [{"from": [0, 0, 0], "to": [16, 8, 16], "faces": {"up": {"texture": "block/red"}}})" +
+                   more + "]}");
+  };
+  const auto box = [](const std::string& from, const std::string& to) {
+    return R"(, {"from": [)" + from + R"(], "to": [)" + to + R"(], "faces": {"up": {"texture": "block/green"}}})";
+  };
+  model("straight", box("8, 8, 0", "16, 16, 16"));
+  model("inner", box("8, 8, 0", "16, 16, 16") + box("0, 8, 8", "8, 16, 16"));
+  model("outer", box("8, 8, 8", "16, 16, 16"));
+  pack.states("oak_stairs", variants_of_stairs());
+  // The models of worlds that store the shape are the expected ones.
+  const std::array<std::pair<const char*, StairCorner>, 5> shapes = {{{"straight", StairCorner::Straight},
+                                                                      {"inner_left", StairCorner::InnerLeft},
+                                                                      {"inner_right", StairCorner::InnerRight},
+                                                                      {"outer_left", StairCorner::OuterLeft},
+                                                                      {"outer_right", StairCorner::OuterRight}}};
+  for (const std::string facing : {"east", "south", "west", "north"}) {
+    for (const std::string half : {"bottom", "top"}) {
+      const TypeAndState old = block("minecraft:oak_stairs", {{"facing", facing}, {"half", half}});
+      const VoxelProperties of_old = look(pack, old.type);
+      EXPECT_EQ(of_old.shapes.rules().neighbours, ShapeNeighbours::Stairs);
+      const AxisOrientation turn = of_old.orientations.of(old.state);
+      EXPECT_EQ(turn.apply(Direction::PosY), half == "top" ? Direction::NegY : Direction::PosY);
+      for (const auto& [shape, corner] : shapes) {
+        const TypeAndState today =
+            block("minecraft:oak_stairs", {{"facing", facing}, {"half", half}, {"shape", shape}});
+        const VoxelProperties of_today = look(pack, today.type);
+        // Left is on the left of a person who walks up: in the game also for stairs upside down.
+        StairCorner wanted = corner;
+        if (half == "top" && corner != StairCorner::Straight) {
+          wanted = static_cast<StairCorner>(((static_cast<int>(corner) - 1) ^ 1) + 1);
+        }
+        const ShapeModel& made = of_old.shapes.model(old.state, turn, {.corner = wanted});
+        EXPECT_EQ(made.bits, shape_of(of_today, today.state).bits) << facing << " " << half << " " << shape;
+        EXPECT_FALSE(made.empty());
+      }
+    }
+  }
+}
+
 TEST(PackLooks, BlendsOverlaysWithTints) {
   PackBuilder pack = small_pack();
   pack.texture("block/grey", packs_test::plain_png({255, 255, 255}));

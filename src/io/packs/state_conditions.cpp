@@ -42,6 +42,10 @@ TypeStates::TypeStates(const VoxelProperties& type) : fields_(minecraft::state_f
     block_ = std::move(text->name);
     named_ = std::move(text->properties);
   }
+  const minecraft::StateField* const facing = field("facing");
+  const minecraft::StateField* const half = field("half");
+  has_corners_ = block_.ends_with("_stairs") && facing != nullptr && half != nullptr && !has("shape") &&
+                 facing->first_bit + facing->bits == half->first_bit;
   connects_ =
       joins_neighbours(block_) && std::ranges::none_of(kSides, [&](const NamedSide& side) { return has(side.name); });
 }
@@ -65,6 +69,25 @@ bool TypeStates::holds_for_absent(const StateTerm& term) const {
   return term.is_negated ? std::ranges::all_of(common, is_met) : std::ranges::any_of(common, is_met);
 }
 
+std::vector<ShapeCondition> TypeStates::with_corners(const std::vector<ShapeCondition>& all, const StateTerm& term) {
+  constexpr std::array<std::pair<std::string_view, StairCorner>, 5> kCorners = {
+      {{"straight", StairCorner::Straight},
+       {"outer_left", StairCorner::OuterLeft},
+       {"outer_right", StairCorner::OuterRight},
+       {"inner_left", StairCorner::InnerLeft},
+       {"inner_right", StairCorner::InnerRight}}};
+  std::vector<ShapeCondition> made;
+  for (const auto& [name, corner] : kCorners) {
+    if (!contains_value(term, name)) continue;
+    for (ShapeCondition condition : all) {
+      if (condition.corner && *condition.corner != corner) continue;
+      condition.corner = corner;
+      made.push_back(condition);
+    }
+  }
+  return made;
+}
+
 Status TypeStates::restrict(std::vector<ShapeCondition>& all, const StateTerm& term) const {
   const auto too_many = [] {
     return make_error(ErrorCode::LimitExceeded,
@@ -83,6 +106,10 @@ Status TypeStates::restrict(std::vector<ShapeCondition>& all, const StateTerm& t
         if (is_free && !is_joined) condition.unconnected.insert(side->direction);
       }
       if (!is_joined && !is_free) all.clear();
+      return {};
+    }
+    if (has_corners_ && term.property == "shape") {
+      all = with_corners(all, term);
       return {};
     }
     const bool is_met = named == named_.end() ? holds_for_absent(term) : contains_value(term, named->second);

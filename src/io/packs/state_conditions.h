@@ -36,14 +36,20 @@ class TypeStates {
 
   /// Returns the conditions under which a case holds: none if it never does, and one without bits if it always does.
   /// Properties that the type does not have take the value that is commonest in the game. Sides of fences, panes and
-  /// the like that the type does not have become connections with neighbours (ShapeNeighbours::Connected).
+  /// the like that the type does not have become connections with neighbours (ShapeNeighbours::Connected), and the
+  /// shape of stairs their corner (ShapeNeighbours::Stairs), left and right as the published format means them.
   /// Errors: LimitExceeded for kMaxTypeConditions.
   [[nodiscard]] Result<std::vector<ShapeCondition>> conditions(const StateCase& of) const;
 
   /// Returns true if conditions may depend on connections, since the type lacks its sides.
   [[nodiscard]] bool connects() const { return connects_; }
+  /// Returns true for stairs whose corners follow their neighbours, since the type lacks their shape. It then has the
+  /// fields facing and half, next to each other.
+  [[nodiscard]] bool has_corners() const { return has_corners_; }
 
  private:
+  [[nodiscard]] static std::vector<ShapeCondition> with_corners(const std::vector<ShapeCondition>& all,
+                                                                const StateTerm& term);
   [[nodiscard]] Status restrict(std::vector<ShapeCondition>& all, const StateTerm& term) const;
   [[nodiscard]] bool holds_for_absent(const StateTerm& term) const;
 
@@ -51,6 +57,7 @@ class TypeStates {
   std::vector<std::pair<std::string, std::string>> named_;  // properties in the name
   std::vector<minecraft::StateField> fields_;
   bool connects_ = false;
+  bool has_corners_ = false;
 };
 
 /// Returns true if a state satisfies a condition, apart from connections.
