@@ -13,11 +13,6 @@
 
 namespace [[gnu::visibility("default")]] quoin {
 
-namespace packs {
-class PackFiles;
-class BlockLooks;
-}  // namespace packs
-
 /// The counts of BlockPacks::apply, over all calls.
 struct BlockPackReport {
   std::size_t types = 0;             ///< Minecraft blocks
@@ -60,9 +55,9 @@ class BlockPacks {
   [[nodiscard]] BlockPackReport report() const;
 
  private:
-  explicit BlockPacks(std::unique_ptr<packs::BlockLooks> looks);
-  friend class packs::BlockLooks;
-  std::unique_ptr<packs::BlockLooks> looks_;
+  struct [[gnu::visibility("hidden")]] Content;
+  explicit BlockPacks(std::unique_ptr<Content> content);
+  std::unique_ptr<Content> content_;
 };
 
 /// Returns a source whose types have the looks of packs. It is otherwise equal.

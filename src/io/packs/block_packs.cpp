@@ -65,14 +65,13 @@ std::string to_string(const BlockPackReport& report) {
 
 #ifdef QUOIN_WITHOUT_GAME_WORLDS
 
-// Only the names remain; there are no objects.
-namespace packs {
-class BlockLooks {
- public:
-  [[nodiscard]] static VoxelProperties applied(const VoxelProperties& type) { return type; }
-  [[nodiscard]] static BlockPackReport report() { return {}; }
+// There are no objects in such builds.
+struct BlockPacks::Content {
+  struct {
+    [[nodiscard]] static VoxelProperties applied(const VoxelProperties& type) { return type; }
+    [[nodiscard]] static BlockPackReport report() { return {}; }
+  } looks;
 };
-}  // namespace packs
 
 namespace {
 
@@ -93,10 +92,15 @@ Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::vector<std::vector<std
 
 #else
 
+struct BlockPacks::Content {
+  explicit Content(std::shared_ptr<const packs::PackFiles> files) : looks(std::move(files)) {}
+  packs::BlockLooks looks;
+};
+
 Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::span<const std::filesystem::path> paths) {
   auto files = packs::PackStack::open(paths);
   if (!files) return files.error();
-  return std::shared_ptr<BlockPacks>(new BlockPacks(std::make_unique<packs::BlockLooks>(std::move(*files))));
+  return std::shared_ptr<BlockPacks>(new BlockPacks(std::make_unique<Content>(std::move(*files))));
 }
 
 Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::vector<std::vector<std::byte>> zips) {
@@ -107,28 +111,28 @@ Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::vector<std::vector<std
     opened.push_back(std::move(*pack));
   }
   auto files = std::make_shared<const packs::PackStack>(std::move(opened));
-  return std::shared_ptr<BlockPacks>(new BlockPacks(std::make_unique<packs::BlockLooks>(std::move(files))));
+  return std::shared_ptr<BlockPacks>(new BlockPacks(std::make_unique<Content>(std::move(files))));
 }
 
 #endif
 
-BlockPacks::BlockPacks(std::unique_ptr<packs::BlockLooks> looks) : looks_(std::move(looks)) {}
+BlockPacks::BlockPacks(std::unique_ptr<Content> content) : content_(std::move(content)) {}
 BlockPacks::~BlockPacks() = default;
 
 void BlockPacks::apply(VoxelRegistry& types) {
   for (std::size_t i = 1; i < types.size(); ++i) {
     const auto type = static_cast<VoxelType>(i);
-    VoxelProperties made = looks_->applied(types[type]);
+    VoxelProperties made = content_->looks.applied(types[type]);
     if (!(made == types[type])) types.replace(type, std::move(made));
   }
 }
 
 VoxelProperties BlockPacks::applied(const VoxelProperties& type) {
-  return looks_->applied(type);
+  return content_->looks.applied(type);
 }
 
 BlockPackReport BlockPacks::report() const {
-  return looks_->report();
+  return content_->looks.report();
 }
 
 std::unique_ptr<ChunkSource> with_packs(std::unique_ptr<ChunkSource> source, std::shared_ptr<BlockPacks> packs) {
