@@ -1,15 +1,9 @@
-#include <cstddef>
-#include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <vector>
 
 #include <quoin/io/formats.h>
-#include <quoin/io/image_files.h>
 #include <quoin/store/world_store.h>
 
-#include "io/minecraft/minecraft_for_tests.h"
 #include "tests/tool_for_tests.h"
 
 namespace quoin {
@@ -86,50 +80,6 @@ TEST_F(ToolWorld, InfoAndCopiesKeepWholeGrids) {
     EXPECT_FALSE(info["grids"][0].contains("whole")) << name;
     EXPECT_EQ(info["grids"][1]["whole"], true) << name;
   }
-}
-
-TEST_F(ToolWorld, PacksGiveBlocksTextures) {
-  // A region with stone and stairs, and a pack with a look for stone.
-  namespace fs = std::filesystem;
-  const std::vector<std::byte> region = minecraft_test::region_with(minecraft_test::chunk_of_stairs(0));
-  std::ofstream(folder_.file("r.0.0.mca"), std::ios::binary)
-      << std::string(reinterpret_cast<const char*>(region.data()), region.size());
-  const auto write = [&](const std::string& name, const std::string& content) {
-    const fs::path path = fs::path(folder_.file("pack")) / "assets/minecraft" / name;
-    fs::create_directories(path.parent_path());
-    std::ofstream(path, std::ios::binary) << content;
-  };
-  const std::string face = R"({"texture": "block/t"})";
-  write("blockstates/stone.json", R"({"variants": {"": {"model": "block/stone"}}})");
-  write("models/block/stone.json", R"({"elements": [{"from": [0, 0, 0], "to": [16, 16, 16], "faces": {"up": )" + face +
-                                       R"(, "down": )" + face + R"(, "north": )" + face + R"(, "south": )" + face +
-                                       R"(, "west": )" + face + R"(, "east": )" + face + "}}]}");
-  AlphaImage image{16, 16, {}};
-  for (int i = 0; i < 256; ++i) image.rgba.insert(image.rgba.end(), {200, 30, 20, 255});
-  write("textures/block/t.png", "");
-  ASSERT_TRUE(write_png(image, fs::path(folder_.file("pack")) / "assets/minecraft/textures/block/t.png"));
-
-  const ToolRun converted = run("convert r.0.0.mca w.quoin --pack pack");
-  ASSERT_EQ(converted.status, 0) << converted.err;
-  EXPECT_NE(converted.err.find("resource packs: 1 block type of 2 without a look: minecraft:oak_stairs"),
-            std::string::npos)
-      << converted.err;
-  const auto colour_in = [&](const char* file) {
-    const auto loaded = load_scene(folder_.file(file));
-    EXPECT_TRUE(loaded);
-    const auto type = loaded->scene.types.find("minecraft:stone");
-    return type ? loaded->scene.types[*type].colour : Rgba8{};
-  };
-  EXPECT_EQ(colour_in("w.quoin"), (Rgba8{200, 30, 20}));
-  // Without a pack, and with one for a world that was converted before.
-  ASSERT_EQ(run("convert r.0.0.mca plain.quoin -q").status, 0);
-  EXPECT_NE(colour_in("plain.quoin"), (Rgba8{200, 30, 20}));
-  ASSERT_EQ(run("convert plain.quoin packed.quoin --pack pack -q").status, 0);
-  EXPECT_EQ(colour_in("packed.quoin"), (Rgba8{200, 30, 20}));
-  EXPECT_NE(run("info r.0.0.mca --pack pack").err.find("without a look"), std::string::npos);
-  const ToolRun refused = run("render r.0.0.mca -o a.png --pack hills.quoin");
-  EXPECT_EQ(refused.status, 1);
-  EXPECT_NE(refused.err.find("hills.quoin: the zip file has no directory"), std::string::npos) << refused.err;
 }
 
 TEST_F(ToolWorld, ReportsAndRepairsDamage) {

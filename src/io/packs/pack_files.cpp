@@ -9,6 +9,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/io/file.h>
 
+#include "core/bytes/bytes.h"
 #include "core/bytes/files.h"
 #include "core/bytes/text.h"
 #include "io/zip.h"
@@ -61,6 +62,9 @@ class FolderPack final : public PackFiles {
 class ZipPack final : public PackFiles {
  public:
   static Result<std::shared_ptr<const PackFiles>> open(std::vector<std::byte> bytes) {
+    if (!text_of(bytes).starts_with("PK")) {
+      return make_error(ErrorCode::BadFormat, "not a resource pack: neither a folder nor a zip file", {}, 0);
+    }
     const std::shared_ptr<ZipPack> pack(new ZipPack(std::move(bytes)));
     auto parts = ZipParts::open(pack->bytes_);
     if (!parts) return parts.error();

@@ -109,7 +109,8 @@ TEST(PackFiles, RefusesNamesThatLeaveThePack) {
 }
 
 TEST(PackFiles, RejectsOtherFilesAndFolders) {
-  EXPECT_NE(error_of_zip({}).find("cut off"), std::string::npos);
+  EXPECT_NE(error_of_zip({}).find("nor a zip file"), std::string::npos);
+  EXPECT_NE(error_of_zip({std::byte{'P'}, std::byte{'K'}, std::byte{3}}).find("cut off"), std::string::npos);
   EXPECT_NE(error_of_zip(zip_of({{"readme.txt", ""}})).find("no folder assets"), std::string::npos);
   const fs::path folder = fresh_folder("empty");
   const auto empty = open_pack(folder);
