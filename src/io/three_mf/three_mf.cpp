@@ -30,8 +30,8 @@
 #include "core/srgb.h"
 #include "io/format_driver.h"
 #include "io/mesh_parts.h"
-#include "io/zip.h"
 #include "io/triangles/triangles.h"
+#include "io/zip.h"
 
 #ifdef QUOIN_HAVE_EXPAT
 #include <expat.h>
