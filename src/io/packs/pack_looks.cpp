@@ -395,10 +395,11 @@ class BlockLooks::Maker {
       rules.connects_to_full_sides = name_ != "redstone_wire";
     }
     std::vector<std::vector<ShapeElement>> all;
-    if (states_.has_corners() && !is_multipart_) {
+    if (states_.has_corners() && follows_corners()) {
       if (auto done = add_stairs(made, rules, all); !done) return done.error();
       return with_shapes(std::move(made), std::move(rules), all);
     }
+    if (outcomes_.empty()) return make_error(ErrorCode::BadFormat, "no model for straight stairs");
     const auto turns = !is_multipart_ && is_one_model() ? orientations() : std::nullopt;
     if (turns) {
       made.orientations = *turns;
@@ -417,6 +418,28 @@ class BlockLooks::Maker {
       }
     }
     return with_shapes(std::move(made), std::move(rules), all);
+  }
+
+  /// Returns true if conditions depend on corners, and each on the facing and half that corners need. Else leaves the
+  /// conditions of straight stairs.
+  bool follows_corners() {
+    const std::uint32_t both = mask_of(*states_.field("facing")) | mask_of(*states_.field("half"));
+    bool has_corners = false;
+    bool is_complete = !is_multipart_;
+    for (const Outcome& outcome : outcomes_) {
+      for (const ShapeCondition& condition : outcome.when) {
+        has_corners = has_corners || condition.corner;
+        is_complete = is_complete && (condition.state_mask & both) == both;
+      }
+    }
+    if (has_corners && is_complete) return true;
+    for (Outcome& outcome : outcomes_) {
+      std::erase_if(outcome.when,
+                    [](const ShapeCondition& each) { return each.corner && *each.corner != StairCorner::Straight; });
+      for (ShapeCondition& condition : outcome.when) condition.corner.reset();
+    }
+    std::erase_if(outcomes_, [](const Outcome& each) { return each.when.empty(); });
+    return false;
   }
 
   /// Adds the parts of stairs whose corners follow their neighbours. These are found in the space of unturned stairs,
@@ -443,9 +466,6 @@ class BlockLooks::Maker {
       all.push_back(elements(outcome));
       std::map<int, Outcome> by_turn;
       for (ShapeCondition condition : outcome.when) {
-        if ((condition.state_mask & both) != both) {
-          return make_error(ErrorCode::Unsupported, "a variant of stairs without facing or half");
-        }
         // The half turn of upper stairs exchanges the sides.
         if (is_top(condition.state) && condition.corner) condition.corner = mirrored(*condition.corner);
         Outcome& part = by_turn[made.orientations.of(condition.state).index()];

@@ -9,8 +9,11 @@
 
 #include <gtest/gtest.h>
 
+#include "io/minecraft/minecraft.h"
+#include "io/minecraft/minecraft_for_tests.h"
 #include "io/packs/pack_shapes.h"
 #include "io/packs/packs_for_tests.h"
+#include "io/zip.h"
 
 namespace quoin::packs {
 namespace {
@@ -226,6 +229,36 @@ TEST(PackLooks, StairsOfOldWorldsFollowNeighbours) {
   }
 }
 
+TEST(PackLooks, StairsWithoutAllVariantsAreStraight) {
+  PackBuilder pack = small_pack();
+  pack.model("block/low",
+             R"({"elements": [{"from": [0, 0, 0], "to": [16, 8, 16], "faces": {"up": {"texture": "block/red"}}}]})");
+  pack.model("block/high",
+             R"({"elements": [{"from": [0, 0, 0], "to": [16, 9, 16], "faces": {"up": {"texture": "block/red"}}}]})");
+  pack.states(
+      "oak_stairs",
+      R"({"variants": {"shape=straight": {"model": "block/low"}, "shape=inner_left": {"model": "block/high"}}})");
+  const TypeAndState stairs = block("minecraft:oak_stairs", {{"facing", "west"}, {"half", "top"}});
+  const VoxelProperties made = look(pack, stairs.type);
+  ASSERT_FALSE(made.shapes.empty());
+  EXPECT_EQ(made.shapes.rules().neighbours, ShapeNeighbours::None);
+  EXPECT_EQ(shape_of(made, stairs.state).max.y, 0.5F);
+  pack.states("oak_stairs", R"({"variants": {"shape=inner_left": {"model": "block/high"}}})");
+  EXPECT_EQ(report_of(pack, stairs.type).without_look, 1U);
+}
+
+TEST(PackLooks, FieldsOfOtherProgramsAreNoHang) {
+  PackBuilder pack = small_pack();
+  pack.states("oak_stairs", variants_of_stairs());
+  VoxelProperties type = block("minecraft:oak_stairs", {{"facing", "east"}, {"half", "top"}}).type;
+  for (const char* layout :
+       {"facing:w3,half:w29", "facing:w31", "facing:w0,half:w2", "facing:n5,half:b1", ":", "facing"}) {
+    type.attributes[minecraft::kStatesAttribute] = layout;
+    type.state_bits = 32;
+    EXPECT_TRUE(validate_type(look(pack, type))) << layout;
+  }
+}
+
 TEST(PackLooks, BlendsOverlaysWithTints) {
   PackBuilder pack = small_pack();
   pack.texture("block/grey", packs_test::plain_png({255, 255, 255}));
@@ -436,6 +469,52 @@ TEST(PackTextures, AcceptsOtherSizesAndRejectsOtherFiles) {
   EXPECT_FALSE(texture_of_png("a", std::as_bytes(std::span(small)).first(40)));
   const std::string nearly = packs_test::plain_png({1, 2, 3, 252});
   EXPECT_EQ(texture_of_png("a", std::as_bytes(std::span(nearly)))->alpha, FaceAlpha::Opaque);
+}
+
+// Returns a zip file with the looks of stone and of stairs in all states.
+std::vector<std::byte> zip_of_stone_and_stairs() {
+  ZipFile zip;
+  const auto put = [&](const char* name, const std::string& content) {
+    zip.begin(std::string("assets/minecraft/") + name);
+    zip.put(content);
+  };
+  std::string faces;
+  for (const char* side : {"down", "up", "north", "south", "west", "east"}) {
+    faces += (faces.empty() ? "\"" : ", \"") + std::string(side) + R"(": {"texture": "block/red"})";
+  }
+  put("textures/block/red.png", packs_test::plain_png(kRed));
+  put("models/block/stone.json",
+      R"({"elements": [{"from": [0, 0, 0], "to": [16, 16, 16], "faces": {)" + faces + "}}]}");
+  put("models/block/low.json", R"({"elements": [{"from": [0, 0, 0], "to": [16, 8, 16], "faces": {)" + faces + "}}]}");
+  put("blockstates/stone.json", R"({"variants": {"": {"model": "block/stone"}}})");
+  put("blockstates/oak_stairs.json", R"({"variants": {"": {"model": "block/low"}}})");
+  return *zip.take();
+}
+
+TEST(BlockPacks, GivesTypesOfChunkSourcesLooks) {
+  const std::vector<std::byte> region = minecraft_test::region_with(minecraft_test::chunk_of_stairs(0));
+  auto plain = minecraft::open_minecraft(region);
+  auto inner = minecraft::open_minecraft(region);
+  ASSERT_TRUE(plain && inner);
+  const auto packs = BlockPacks::open(std::vector<std::vector<std::byte>>{zip_of_stone_and_stairs()});
+  ASSERT_TRUE(packs) << packs.error().message;
+  const std::unique_ptr<ChunkSource> source = with_packs(std::move(*inner), *packs);
+  EXPECT_EQ(source->types().size(), 1U) << "no part was read";
+  const auto part = source->read_part(0);
+  const auto plain_part = (*plain)->read_part(0);
+  ASSERT_TRUE(part && plain_part);
+  const VoxelRegistry types = source->types();
+  const VoxelRegistry plain_types = (*plain)->types();
+  ASSERT_EQ(types.size(), plain_types.size());
+  EXPECT_EQ(part->chunks.at(0).voxels.types(), plain_part->chunks.at(0).voxels.types());
+  for (std::size_t i = 1; i < types.size(); ++i) {
+    const VoxelProperties& type = types[static_cast<VoxelType>(i)];
+    EXPECT_EQ(type.name, plain_types[static_cast<VoxelType>(i)].name);
+    EXPECT_FALSE(type.faces.empty()) << type.name;
+    EXPECT_EQ(type.shapes.empty(), type.name == "minecraft:stone");
+  }
+  EXPECT_EQ(to_string((*packs)->report()), "");
+  EXPECT_EQ((*packs)->report().types, 2U);
 }
 
 TEST(BlockPacks, AppliesToRegistries) {

@@ -44,7 +44,10 @@ TypeStates::TypeStates(const VoxelProperties& type) : fields_(minecraft::state_f
   }
   const minecraft::StateField* const facing = field("facing");
   const minecraft::StateField* const half = field("half");
-  has_corners_ = block_.ends_with("_stairs") && facing != nullptr && half != nullptr && !has("shape") &&
+  const auto has_words = [](const minecraft::StateField* one, int bits) {
+    return one != nullptr && one->kind == 'w' && one->bits == bits;
+  };
+  has_corners_ = block_.ends_with("_stairs") && has_words(facing, 3) && has_words(half, 2) && !has("shape") &&
                  facing->first_bit + facing->bits == half->first_bit;
   connects_ =
       joins_neighbours(block_) && std::ranges::none_of(kSides, [&](const NamedSide& side) { return has(side.name); });
