@@ -83,8 +83,8 @@ struct LoadOptions {
   /// The dimension of a Minecraft world: "overworld", "nether", "end" or NAMESPACE:NAME. Empty: the overworld, or the
   /// first dimension if there is none. Other formats ignore it.
   std::string dimension{};
-  /// Resource packs of Minecraft for the looks of its blocks, the lowest first (BlockPacks). A warning counts blocks and
-  /// textures that they lack. Types of other formats stay as they are.
+  /// Resource packs of Minecraft for the looks of its blocks, the lowest first (BlockPacks). A warning counts the
+  /// blocks and textures that they lack. Types of other formats stay as they are.
   std::vector<std::filesystem::path> packs{};
   /// If set, reads the file as raw values: a volume of this size and type.
   std::optional<RawVolume> raw = std::nullopt;

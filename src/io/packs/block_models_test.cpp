@@ -45,7 +45,8 @@ TEST(BlockModels, ReadsElements) {
   PackBuilder pack;
   pack.model("block/a", R"({"elements": [{"from": [16, 0, -16], "to": [0, 32, 0.5], // a comment
     "rotation": {"origin": [8, 0, 8], "axis": "x", "angle": -22.5, "rescale": true},
-    "faces": {"up": {"texture": "#t", "uv": [0, 1.5, 16, 8], "rotation": 270, "tintindex": 0}, "north": {"texture": "b:c"}}}]})");
+    "faces": {"up": {"texture": "#t", "uv": [0, 1.5, 16, 8], "rotation": 270, "tintindex": 0},
+              "north": {"texture": "b:c"}}}]})");
   const auto files = pack.files();
   ModelReader reader(*files);
   const auto model = reader.model("block/a");

@@ -36,7 +36,7 @@ struct PackLibrary {
 /// Gives types their looks. Threads: any number may call all functions at once.
 class BlockLooks {
  public:
-  /// `own`: used for blocks without a model with elements in `packs`; null if there is none. Textures also come from it.
+  /// `own`: used for blocks without a model with elements in `packs`, also for textures; null if there is none.
   explicit BlockLooks(std::shared_ptr<const PackFiles> packs, std::shared_ptr<const PackFiles> own = nullptr);
 
   /// Returns a type with its look; unchanged if it is no Minecraft block or no look is found.

@@ -99,9 +99,9 @@ TEST(PackLooks, OrientationsFollowStates) {
       "furnace",
       R"({"variants": {"facing=north": {"model": "block/furnace"}, "facing=east": {"model": "block/furnace", "y": 90},
     "facing=south": {"model": "block/furnace", "y": 180}, "facing=west": {"model": "block/furnace", "y": 270}}})");
-  pack.states(
-      "observer",
-      R"({"variants": {"facing=up": {"model": "block/furnace", "x": 270}, "facing=down": {"model": "block/furnace", "x": 90}}})");
+  pack.states("observer",
+              R"({"variants": {"facing=up": {"model": "block/furnace", "x": 270},
+        "facing=down": {"model": "block/furnace", "x": 90}}})");
   const std::vector<std::pair<std::string, Direction>> facings = {
       {"north", Direction::NegZ}, {"east", Direction::PosX}, {"south", Direction::PosZ}, {"west", Direction::NegX}};
   for (const auto& [facing, direction] : facings) {
@@ -315,9 +315,9 @@ TEST(PackLooks, FluidsHaveHeights) {
 TEST(PackLooks, WiresAreColouredByPower) {
   PackBuilder pack = small_pack();
   pack.states("redstone_wire", R"({"multipart": [{"apply": {"model": "block/dot"}}]})");
-  pack.model(
-      "block/dot",
-      R"({"elements": [{"from": [0, 0.25, 0], "to": [16, 0.25, 16], "faces": {"up": {"texture": "block/red", "tintindex": 0}}}]})");
+  pack.model("block/dot",
+             R"({"elements": [{"from": [0, 0.25, 0], "to": [16, 0.25, 16],
+        "faces": {"up": {"texture": "block/red", "tintindex": 0}}}]})");
   const auto tint = [&](const char* power) {
     const TypeAndState wire = block("minecraft:redstone_wire", {{"power", power}});
     const VoxelProperties made = look(pack, wire.type);

@@ -25,8 +25,8 @@ struct PackTexture {
   FaceAlpha alpha = FaceAlpha::Opaque;
 };
 
-/// Makes a texture of a PNG: its first frame, if `animation` is the text of its .mcmeta file with an animation. An image
-/// is sampled by its nearest pixels unless it is a square with a power of two from 16 to 1,024 as side.
+/// Makes a texture of a PNG: its first frame, if `animation` is the text of its .mcmeta file with an animation. An
+/// image is sampled by its nearest pixels unless it is a square with a power of two from 16 to 1,024 as side.
 ///
 /// Errors: BadFormat for images that are no PNG; LimitExceeded above 2^24 pixels, before it is decoded.
 [[nodiscard]] Result<PackTexture> texture_of_png(const std::string& name, std::span<const std::byte> png,

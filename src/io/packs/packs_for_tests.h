@@ -100,10 +100,12 @@ inline void add_parents(PackBuilder& pack) {
   pack.model("block/cross", R"({"elements": [
     {"from": [0.8, 0, 8], "to": [15.2, 16, 8], "shade": false,
      "rotation": {"origin": [8, 8, 8], "axis": "y", "angle": 45, "rescale": true},
-     "faces": {"north": {"uv": [0, 0, 16, 16], "texture": "#cross"}, "south": {"uv": [0, 0, 16, 16], "texture": "#cross"}}},
+     "faces": {"north": {"uv": [0, 0, 16, 16], "texture": "#cross"},
+               "south": {"uv": [0, 0, 16, 16], "texture": "#cross"}}},
     {"from": [8, 0, 0.8], "to": [8, 16, 15.2], "shade": false,
      "rotation": {"origin": [8, 8, 8], "axis": "y", "angle": 45, "rescale": true},
-     "faces": {"west": {"uv": [0, 0, 16, 16], "texture": "#cross"}, "east": {"uv": [0, 0, 16, 16], "texture": "#cross"}}}]})");
+     "faces": {"west": {"uv": [0, 0, 16, 16], "texture": "#cross"},
+               "east": {"uv": [0, 0, 16, 16], "texture": "#cross"}}}]})");
   pack.model("block/fence_post", R"({"elements": [)" + box("6, 0, 6", "10, 16, 10", sides) + "]}");
   pack.model("block/fence_side",
              R"({"elements": [)" + box("7, 12, 0", "9, 15, 9", sides) + ", " + box("7, 6, 0", "9, 9, 9", sides) + "]}");
