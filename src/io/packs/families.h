@@ -1,0 +1,134 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include <quoin/core/result.h>
+
+// Block families: tables that give every block name, also of mods, its block states, models and textures in the
+// published resource-pack format. docs/formats/block_pack.md describes the tables.
+
+namespace quoin::packs {
+
+/// A name with a namespace: "minecraft" and "oak_stairs".
+struct PackName {
+  std::string space = "minecraft";
+  std::string name;
+
+  bool operator==(const PackName&) const = default;
+};
+
+/// Splits "minecraft:oak_stairs"; names without a namespace are Minecraft's.
+[[nodiscard]] PackName pack_name(std::string_view text);
+
+/// Returns the texts that the stars of a pattern stand for, in order; nullopt if the pattern does not match. Stars match
+/// at least one character, as few as possible. A pattern has at most two stars.
+[[nodiscard]] std::optional<std::vector<std::string>> match_name(std::string_view pattern, std::string_view name);
+
+/// Rows of a table that are selected by patterns of names: exact names first, then the first matching pattern.
+class NamePatterns {
+ public:
+  /// Adds patterns, separated by spaces, that select `row`. Earlier patterns win. Errors: BadFormat for more than two
+  /// stars or a name that was added before.
+  [[nodiscard]] Status add(std::string_view patterns, std::size_t row);
+
+  struct Match {
+    std::size_t row = 0;
+    std::vector<std::string> stars;
+    bool is_fallback = false;  ///< the pattern is a single star
+    bool is_exact = false;     ///< the pattern is a name
+  };
+  [[nodiscard]] std::optional<Match> find(std::string_view name) const;
+
+ private:
+  std::unordered_map<std::string, std::size_t> exact_;
+  std::vector<std::pair<std::string, std::size_t>> patterns_;
+};
+
+/// The tables of families, and the rules that assign them to names. Immutable after it was made.
+class BlockFamilies {
+ public:
+  /// Parses both tables.
+  ///
+  /// Errors: BadFormat, naming the family, model or rule, for invalid JSON, unknown keys, models, families or options,
+  ///         numbers outside the published format, and lists beyond their limits.
+  [[nodiscard]] static Result<BlockFamilies> from_text(std::string_view families, std::string_view rules);
+
+  /// Returns the block-state file of a block as JSON. Every name has one.
+  [[nodiscard]] std::string block_state(const PackName& block) const;
+  /// Returns a model file as JSON; nullopt if no block state refers to it and it is no published parent.
+  [[nodiscard]] std::optional<std::string> model(const PackName& model) const;
+  /// Returns the name of the family.
+  [[nodiscard]] std::string family(const PackName& block) const;
+  /// Returns true if a rule other than the last one, which makes cubes of all names, matches.
+  [[nodiscard]] bool is_known(const PackName& block) const;
+  /// Returns the number of rules.
+  [[nodiscard]] std::size_t rule_count() const { return rules_.size(); }
+
+ private:
+  struct Face {
+    std::string variable;  // without '#'
+    std::optional<std::array<float, 4>> uv;
+    int turn = 0;
+  };
+  struct Box {
+    std::array<float, 3> from{};
+    std::array<float, 3> to{};
+    std::map<char, Face> faces;  // by the letter of the direction
+    std::string turn;            // JSON of "rotation", or empty
+    bool has_shade = true;
+  };
+  struct State {
+    std::vector<std::pair<std::string, std::string>> when;
+    std::string model;  // a key of Family::models
+    int x = 0;
+    int y = 0;
+    bool keeps_uv = false;
+  };
+  struct ModelUse {
+    std::string model;
+    std::vector<std::pair<std::string, std::string>> renamed;  // texture variables and their new names
+  };
+  struct Family {
+    std::map<std::string, ModelUse> models;  // by the end of their published name
+    std::vector<State> states;
+    bool has_parts = false;
+    bool is_full = false;
+  };
+  struct Rule {
+    std::string family;  // or, after '=', the name whose rule is meant
+    std::vector<std::pair<std::string, std::string>> textures;
+    std::vector<std::string> tinted;
+  };
+  struct Found {
+    const Rule* rule = nullptr;
+    const Family* family = nullptr;
+    PackName block;  // the block whose rule it is: without "waxed_"
+    std::vector<std::string> stars;
+    bool is_fallback = false;
+    bool is_exact = false;
+  };
+  struct Parser;
+
+  [[nodiscard]] Found find(const PackName& block, int depth = 0) const;
+  [[nodiscard]] std::string texture(const Found& found, const std::string& text) const;
+  [[nodiscard]] std::string texture_of_material(const Found& found, std::string_view side) const;
+  [[nodiscard]] std::string model_name(const PackName& block, const Found& found, const std::string& end) const;
+  [[nodiscard]] std::string model_json(const std::vector<Box>& boxes,
+                                       const std::vector<std::pair<std::string, std::string>>& textures,
+                                       const std::vector<std::string>& tinted) const;
+
+  std::map<std::string, std::vector<Box>> models_;
+  std::map<std::string, Family> families_;
+  std::vector<Rule> rules_;
+  NamePatterns names_;
+};
+
+}  // namespace quoin::packs

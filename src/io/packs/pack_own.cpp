@@ -1,0 +1,242 @@
+#include "io/packs/pack_own.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <span>
+
+#include <nlohmann/json.hpp>
+#include <quoin/core/assert.h>
+#include <quoin/grid/texture.h>
+
+#include "io/image/image_codecs.h"
+#include "io/minecraft/block_looks.h"
+#include "io/packs/pack_patterns.h"
+
+namespace quoin::packs {
+
+namespace {
+
+constexpr std::size_t kMaxLayers = 8;
+
+constexpr char kFamilyTable[] =
+#include "block_pack_families.inc"
+    ;
+constexpr char kRuleTable[] =
+#include "block_pack_rules.inc"
+    ;
+constexpr char kTextureTable[] =
+#include "block_pack_textures.inc"
+    ;
+
+std::optional<std::uint32_t> parse_colour(std::string_view text) {
+  if (text.size() != 7 || text[0] != '#') return std::nullopt;
+  std::uint32_t rgb = 0;
+  const auto [end, error] = std::from_chars(text.data() + 1, text.data() + text.size(), rgb, 16);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return rgb;
+}
+
+Rgba8 colour_of_rgb(std::uint32_t rgb) {
+  return {static_cast<std::uint8_t>(rgb >> 16), static_cast<std::uint8_t>(rgb >> 8), static_cast<std::uint8_t>(rgb)};
+}
+
+/// Returns the colour of a block; `name` may be a texture's, such as "furnace_side".
+Rgba8 colour_of_block(const PackName& block) {
+  constexpr std::array<std::string_view, 8> kEnds = {"_top",  "_side", "_front", "_bottom",
+                                                     "_back", "_end",  "_inner", "_on"};
+  std::string name = block.name;
+  for (const std::string_view end : kEnds) {
+    if (name.ends_with(end) && name.size() > end.size()) name.resize(name.size() - end.size());
+  }
+  const minecraft::BlockLook whole = minecraft::look_of_block(block.space + ":" + block.name, false, false);
+  if (whole.knowledge == minecraft::Knowledge::Table || name == block.name) return whole.colour;
+  return minecraft::look_of_block(block.space + ":" + name, false, false).colour;
+}
+
+/// Returns the factor by which greys are multiplied, and then clamped to 1, so that their weighted mean is `mean`.
+float gain_for(const std::vector<std::pair<float, float>>& greys_and_weights, float mean) {
+  float low = 0.0F;
+  float high = 1'024.0F;
+  constexpr int kSteps = 40;
+  for (int i = 0; i < kSteps; ++i) {
+    const float gain = std::sqrt(std::max(low, 1e-6F) * high);
+    float sum = 0.0F;
+    float weights = 0.0F;
+    for (const auto& [grey, weight] : greys_and_weights) {
+      sum += weight * std::min(1.0F, gain * grey);
+      weights += weight;
+    }
+    (sum < mean * weights ? low : high) = gain;
+  }
+  return high;
+}
+
+/// Draws a pattern in a colour over an image. The mean of the layer's visible texels is the colour, in linear light.
+void add_layer(const Pattern& pattern, Vec3 colour, float opacity, std::array<Vec3, 256>& image,
+               std::array<float, 256>& alpha) {
+  std::array<float, 256> light{};
+  std::vector<std::pair<float, float>> weighted;
+  for (std::size_t i = 0; i < pattern.size(); ++i) {
+    light[i] = std::pow(std::clamp(pattern[i].grey, 0.0F, 1.0F), 2.2F);
+    if (pattern[i].alpha > 0.0F) weighted.emplace_back(light[i], pattern[i].alpha);
+  }
+  Vec3 gain{0.0F};
+  for (int channel = 0; channel < 3; ++channel) gain[channel] = gain_for(weighted, colour[channel]);
+  for (std::size_t i = 0; i < pattern.size(); ++i) {
+    const float over = pattern[i].alpha * opacity;
+    if (over <= 0.0F) continue;
+    Vec3 texel{0.0F};
+    for (int channel = 0; channel < 3; ++channel) texel[channel] = std::min(1.0F, gain[channel] * light[i]);
+    const float sum = over + alpha[i] * (1.0F - over);
+    image[i] = (texel * over + image[i] * (alpha[i] * (1.0F - over))) * (1.0F / sum);
+    alpha[i] = sum;
+  }
+}
+
+std::string put(std::string text, const std::string& old, const std::string& by) {
+  for (std::size_t at = text.find(old); at != std::string::npos; at = text.find(old, at + by.size())) {
+    text.replace(at, old.size(), by);
+  }
+  return text;
+}
+
+/// Splits "assets/SPACE/FOLDER/NAME.END" into SPACE and NAME.
+std::optional<PackName> name_in(std::string_view path, std::string_view folder, std::string_view end) {
+  constexpr std::string_view kTop = "assets/";
+  if (!path.starts_with(kTop) || !path.ends_with(end)) return std::nullopt;
+  path = path.substr(kTop.size(), path.size() - kTop.size() - end.size());
+  const std::size_t slash = path.find('/');
+  if (slash == std::string_view::npos || !path.substr(slash + 1).starts_with(folder)) return std::nullopt;
+  PackName name{std::string(path.substr(0, slash)), std::string(path.substr(slash + 1 + folder.size()))};
+  return name.name.empty() ? std::nullopt : std::optional(std::move(name));
+}
+
+std::vector<std::byte> bytes_of(const std::string& text) {
+  std::vector<std::byte> bytes(text.size());
+  std::memcpy(bytes.data(), text.data(), text.size());
+  return bytes;
+}
+
+}  // namespace
+
+Result<TextureRecipes> TextureRecipes::from_text(std::string_view table) {
+  using Json = nlohmann::json;
+  const Json rows = Json::parse(table, nullptr, false);
+  if (!rows.is_array()) return make_error(ErrorCode::BadFormat, "the table of textures is no JSON list");
+  TextureRecipes made;
+  for (const Json& row : rows) {
+    const auto fault = [&](const std::string& reason) {
+      return make_error(ErrorCode::BadFormat, "texture " + row.dump().substr(0, 60) + ": " + reason);
+    };
+    if (!row.is_array() || row.size() < 2 || row.size() > kMaxLayers + 1) {
+      return fault("must have names and 1 to " + std::to_string(kMaxLayers) + " layers");
+    }
+    std::vector<Layer> layers;
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      if (!row[i].is_string()) return fault("must be texts");
+      if (i == 0) continue;
+      std::string text = row[i].get<std::string>();
+      std::vector<std::string> parts;
+      for (std::size_t at = 0; at < text.size();) {
+        const std::size_t end = std::min(text.find(' ', at), text.size());
+        parts.push_back(text.substr(at, end - at));
+        at = end + 1;
+      }
+      if (parts.size() < 2 || parts.size() > 4) return fault("a layer is a pattern, a colour and factors: " + text);
+      if (!draw_pattern(parts[0])) return fault("no pattern " + parts[0]);
+      if (parts[1][0] == '#' && !parse_colour(parts[1])) return fault("invalid colour " + parts[1]);
+      Layer layer{parts[0], parts[1]};
+      for (std::size_t k = 2; k < parts.size(); ++k) {
+        float& number = parts[k][0] == 'x' ? layer.brightness : layer.alpha;
+        const char* const end = parts[k].data() + parts[k].size();
+        const auto [read, error] = std::from_chars(parts[k].data() + 1, end, number);
+        const bool is_factor = parts[k][0] == 'x' || parts[k][0] == 'a';
+        if (!is_factor || error != std::errc() || read != end || !(number >= 0.0F && number <= 8.0F)) {
+          return fault("invalid factor " + parts[k]);
+        }
+      }
+      layers.push_back(std::move(layer));
+    }
+    if (auto status = made.names_.add(row[0].get<std::string>(), made.rows_.size()); !status) {
+      return fault(status.error().message);
+    }
+    made.rows_.push_back(std::move(layers));
+  }
+  return made;
+}
+
+std::optional<AlphaImage> TextureRecipes::draw(const PackName& texture) const {
+  constexpr std::string_view kFolder = "block/";
+  if (!texture.name.starts_with(kFolder)) return std::nullopt;
+  PackName name{texture.space, texture.name.substr(kFolder.size())};
+  auto match = names_.find(name.name);
+  if (!match && texture.space == "quoin") {  // "quoin:block/SPACE/NAME": of an unknown block
+    const std::size_t slash = name.name.find('/');
+    if (slash != std::string::npos) name = {name.name.substr(0, slash), name.name.substr(slash + 1)};
+    match = names_.find(name.name);
+    if (!match) match = names_.find("unknown");
+  }
+  if (!match) return std::nullopt;
+  if (name.space == "quoin") name.space = "minecraft";
+  std::array<Vec3, 256> image{};
+  std::array<float, 256> alpha{};
+  for (const Layer& layer : rows_[match->row]) {
+    Rgba8 colour{};
+    if (const auto fixed = parse_colour(layer.colour)) {
+      colour = colour_of_rgb(*fixed);
+    } else {
+      std::string block = put(layer.colour, "self", name.name);
+      for (std::size_t i = 0; i < match->stars.size(); ++i) {
+        block = put(std::move(block), "{" + std::to_string(i + 1) + "}", match->stars[i]);
+      }
+      colour = colour_of_block({name.space, std::move(block)});
+    }
+    add_layer(*draw_pattern(layer.pattern), linear_colour(colour) * layer.brightness, layer.alpha, image, alpha);
+  }
+  AlphaImage made{kPatternSize, kPatternSize, std::vector<std::uint8_t>(image.size() * 4)};
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    const Rgba8 texel = srgb_colour(image[i]);
+    const auto a = static_cast<std::uint8_t>(std::lround(std::clamp(alpha[i], 0.0F, 1.0F) * 255.0F));
+    const std::array<std::uint8_t, 4> bytes = {texel.r, texel.g, texel.b, a};
+    std::ranges::copy(bytes, made.rgba.begin() + static_cast<std::ptrdiff_t>(i * 4));
+  }
+  return made;
+}
+
+const std::shared_ptr<const OwnPack>& OwnPack::instance() {
+  static const std::shared_ptr<const OwnPack> pack = [] {
+    auto families = BlockFamilies::from_text(kFamilyTable, kRuleTable);
+    auto recipes = TextureRecipes::from_text(kTextureTable);
+    QUOIN_ASSERT(families && recipes, "valid tables, which tests check");
+    return std::make_shared<const OwnPack>(std::move(*families), std::move(*recipes));
+  }();
+  return pack;
+}
+
+Result<std::optional<std::vector<std::byte>>> OwnPack::read(std::string_view path, std::size_t max_bytes) const {
+  using Found = std::optional<std::vector<std::byte>>;
+  if (!is_pack_path(path)) return Found();
+  Found bytes;
+  if (const auto block = name_in(path, "blockstates/", ".json")) {
+    bytes = bytes_of(families_.block_state(*block));
+  } else if (const auto model = name_in(path, "models/", ".json")) {
+    if (const auto text = families_.model(*model)) bytes = bytes_of(*text);
+  } else if (const auto texture = name_in(path, "textures/", ".png")) {
+    if (const auto image = recipes_.draw(*texture)) {
+      auto png = encode_png(PngImage{kPatternSize, kPatternSize, 4, image->rgba}, PngEffort::Quick);
+      if (!png) return png.error();
+      bytes = std::move(*png);
+    }
+  }
+  if (bytes && bytes->size() > max_bytes) {
+    return make_error(ErrorCode::LimitExceeded, "a file of more than " + std::to_string(max_bytes) + " bytes",
+                      std::string(path));
+  }
+  return bytes;
+}
+
+}  // namespace quoin::packs

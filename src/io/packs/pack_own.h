@@ -1,0 +1,63 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include <quoin/core/image.h>
+#include <quoin/core/result.h>
+
+#include "io/packs/families.h"
+#include "io/packs/pack_files.h"
+
+// Quoin's own block pack: block states, models and textures for every block name, without any file. It is the lowest
+// pack of a stack, so files of other packs replace its files.
+
+namespace quoin::packs {
+
+/// Recipes of textures: layers of patterns (pack_patterns.h), each in the colour of a block or in a fixed colour.
+/// docs/formats/block_pack.md describes the table. Immutable after it was made.
+class TextureRecipes {
+ public:
+  /// Parses the table. Errors: BadFormat, naming the row, for invalid JSON, unknown patterns and invalid colours.
+  [[nodiscard]] static Result<TextureRecipes> from_text(std::string_view table);
+
+  /// Draws a texture of 16x16 texels; nullopt if no recipe has its name. Textures of other names that begin with
+  /// "quoin:block/" always exist: their patterns follow from the words of the name.
+  [[nodiscard]] std::optional<AlphaImage> draw(const PackName& texture) const;
+
+ private:
+  struct Layer {
+    std::string pattern;
+    std::string colour;       ///< "#RRGGBB", or a block name with "{1}" and the like
+    float brightness = 1.0F;  ///< multiplies the colour, in linear light
+    float alpha = 1.0F;
+  };
+
+  std::vector<std::vector<Layer>> rows_;
+  NamePatterns names_;
+};
+
+/// The files of the own pack. They are made when they are read: the same bytes every time.
+class OwnPack final : public PackFiles {
+ public:
+  OwnPack(BlockFamilies families, TextureRecipes recipes)
+      : families_(std::move(families)), recipes_(std::move(recipes)) {}
+
+  /// Returns the pack of the library's tables, which are parsed at the first call.
+  [[nodiscard]] static const std::shared_ptr<const OwnPack>& instance();
+
+  [[nodiscard]] const BlockFamilies& families() const { return families_; }
+  /// Reads "assets/SPACE/blockstates/NAME.json", "assets/SPACE/models/block/NAME.json" or
+  /// "assets/SPACE/textures/block/NAME.png". Every name has block states, but only blocks and names of the tables have
+  /// models and textures. Errors: LimitExceeded if the file is larger than `max_bytes`.
+  [[nodiscard]] Result<std::optional<std::vector<std::byte>>> read(std::string_view path,
+                                                                   std::size_t max_bytes) const override;
+
+ private:
+  BlockFamilies families_;
+  TextureRecipes recipes_;
+};
+
+}  // namespace quoin::packs
