@@ -1,12 +1,13 @@
 #include "io/packs/families.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <tuple>
 
 #include <nlohmann/json.hpp>
 #include <quoin/core/assert.h>
+
+#include "core/bytes/text.h"
 
 namespace quoin::packs {
 
@@ -38,20 +39,13 @@ std::pair<std::string, std::string> split(std::string_view text, char between) {
   return {std::string(text.substr(0, at)), std::string(text.substr(at + 1))};
 }
 
-std::optional<float> family_number(std::string_view text) {
-  float number = 0.0F;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(number)) return std::nullopt;
-  return number;
-}
-
 template <std::size_t kCount>
 std::optional<std::array<float, kCount>> family_numbers(std::string_view text, float least, float most) {
   const std::vector<std::string> parts = words(text, ',');
   if (parts.size() != kCount) return std::nullopt;
   std::array<float, kCount> numbers{};
   for (std::size_t i = 0; i < kCount; ++i) {
-    const auto number = family_number(parts[i]);
+    const auto number = parse_float(parts[i]);
     if (!number || *number < least || *number > most) return std::nullopt;
     numbers[i] = *number;
   }
@@ -146,7 +140,7 @@ struct BlockFamilies::Parser {
     if (face.variable.empty()) return fault("the face " + token + " has no texture");
     if (!uv.empty() && !(face.uv = family_numbers<4>(uv, 0.0F, 16.0F))) return fault("invalid texture part " + uv);
     if (!turn.empty()) {
-      const auto degrees = family_number(turn);
+      const auto degrees = parse_float(turn);
       if (!degrees || (*degrees != 90.0F && *degrees != 180.0F && *degrees != 270.0F)) {
         return fault("invalid texture turn " + turn);
       }
@@ -176,7 +170,7 @@ struct BlockFamilies::Parser {
     if (parts.size() != 5 || (parts[0] != "x" && parts[0] != "y" && parts[0] != "z")) {
       return fault("invalid turn " + text);
     }
-    const auto degrees = family_number(parts[1]);
+    const auto degrees = parse_float(parts[1]);
     const auto origin = family_numbers<3>(parts[2] + "," + parts[3] + "," + parts[4], -16.0F, 32.0F);
     if (!degrees || std::abs(*degrees) > 90.0F || !origin) return fault("invalid turn " + text);
     Json json = {{"origin", *origin}, {"axis", parts[0]}, {"angle", *degrees}};
@@ -190,7 +184,7 @@ struct BlockFamilies::Parser {
     Box made;
     if (tokens.size() < 7) return fault("a box needs six numbers and its faces: " + text);
     for (std::size_t i = 0; i < 6; ++i) {
-      const auto number = family_number(tokens[i]);
+      const auto number = parse_float(tokens[i]);
       if (!number || *number < -16.0F || *number > 32.0F) return fault("invalid corner " + tokens[i]);
       (i < 3 ? made.from[i] : made.to[i - 3]) = *number;
     }
@@ -309,7 +303,7 @@ struct BlockFamilies::Parser {
       if (token == "uvlock") {
         state.keeps_uv = true;
       } else if (token.starts_with("x=") || token.starts_with("y=")) {
-        const auto degrees = family_number(token.substr(2));
+        const auto degrees = parse_float(token.substr(2));
         if (!degrees || std::fmod(*degrees, 90.0F) != 0.0F || *degrees < 0.0F || *degrees > 270.0F) {
           return fault("invalid turn " + token);
         }

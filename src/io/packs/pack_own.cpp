@@ -12,6 +12,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/grid/texture.h>
 
+#include "core/bytes/text.h"
 #include "io/image/image_codecs.h"
 #include "io/minecraft/block_looks.h"
 #include "io/packs/pack_patterns.h"
@@ -57,7 +58,7 @@ Rgba8 colour_of_block(const PackName& block) {
   return minecraft::look_of_block(block.space + ":" + name, false, false).colour;
 }
 
-/// Returns the factor by which greys are multiplied, and then clamped to 1, so that their weighted mean is `mean`.
+/// Returns the gain at which the greys, clamped to 1, have this weighted mean.
 float gain_for(const std::vector<std::pair<float, float>>& greys_and_weights, float mean) {
   float low = 0.0F;
   float high = 1'024.0F;
@@ -81,7 +82,8 @@ void add_layer(const Pattern& pattern, Vec3 colour, float opacity, std::array<Ve
   std::array<float, 256> light{};
   std::vector<std::pair<float, float>> weighted;
   for (std::size_t i = 0; i < pattern.size(); ++i) {
-    light[i] = std::pow(std::clamp(pattern[i].grey, 0.0F, 1.0F), 2.2F);
+    const auto grey = static_cast<std::uint8_t>(std::lround(std::clamp(pattern[i].grey, 0.0F, 1.0F) * 255.0F));
+    light[i] = linear_colour({grey, grey, grey}).x;
     if (pattern[i].alpha > 0.0F) weighted.emplace_back(light[i], pattern[i].alpha);
   }
   Vec3 gain{0.0F};
@@ -143,21 +145,18 @@ Result<TextureRecipes> TextureRecipes::from_text(std::string_view table) {
       std::vector<std::string> parts;
       for (std::size_t at = 0; at < text.size();) {
         const std::size_t end = std::min(text.find(' ', at), text.size());
-        parts.push_back(text.substr(at, end - at));
+        if (end > at) parts.push_back(text.substr(at, end - at));
         at = end + 1;
       }
       if (parts.size() < 2 || parts.size() > 4) return fault("a layer is a pattern, a colour and factors: " + text);
-      if (!draw_pattern(parts[0])) return fault("no pattern " + parts[0]);
+      if (!has_pattern(parts[0])) return fault("no pattern " + parts[0]);
       if (parts[1][0] == '#' && !parse_colour(parts[1])) return fault("invalid colour " + parts[1]);
       Layer layer{parts[0], parts[1]};
       for (std::size_t k = 2; k < parts.size(); ++k) {
-        float& number = parts[k][0] == 'x' ? layer.brightness : layer.alpha;
-        const char* const end = parts[k].data() + parts[k].size();
-        const auto [read, error] = std::from_chars(parts[k].data() + 1, end, number);
+        const auto number = parse_float(std::string_view(parts[k]).substr(1));
         const bool is_factor = parts[k][0] == 'x' || parts[k][0] == 'a';
-        if (!is_factor || error != std::errc() || read != end || !(number >= 0.0F && number <= 8.0F)) {
-          return fault("invalid factor " + parts[k]);
-        }
+        if (!is_factor || !number || *number < 0.0F || *number > 8.0F) return fault("invalid factor " + parts[k]);
+        (parts[k][0] == 'x' ? layer.brightness : layer.alpha) = *number;
       }
       layers.push_back(std::move(layer));
     }

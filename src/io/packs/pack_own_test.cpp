@@ -245,6 +245,8 @@ TEST(Patterns, AreDrawnByNameAndNumber) {
   EXPECT_FALSE(draw_pattern("planks1234"));
   EXPECT_FALSE(draw_pattern(""));
   EXPECT_FALSE(draw_pattern("no_such_pattern"));
+  EXPECT_TRUE(has_pattern("wheat7"));
+  EXPECT_FALSE(has_pattern("wheat7777"));
   const auto covered = [](const Pattern& pattern) {
     return std::ranges::count_if(pattern, [](const PatternTexel& texel) { return texel.alpha > 0.0F; });
   };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 // Patterns that fill a whole face: stone, wood, metal, glass, cloth.
 
@@ -701,20 +702,33 @@ const NamedPattern* find_face_pattern(std::string_view name) {
   return found == std::end(kFaces) ? nullptr : found;
 }
 
-std::optional<Pattern> draw_pattern(std::string_view name) {
+namespace {
+
+/// Splits a name into that of a table and the number at its end; null if there is no such pattern.
+std::pair<const NamedPattern*, int> find_pattern(std::string_view name) {
   std::size_t end = name.size();
   while (end > 0 && name[end - 1] >= '0' && name[end - 1] <= '9') --end;
-  if (name.size() - end > 3) return std::nullopt;
+  if (name.size() - end > 3) return {};
   int number = 0;
   for (const char digit : name.substr(end)) number = number * 10 + (digit - '0');
   for (const auto find : {find_face_pattern, find_plant_pattern, find_thing_pattern}) {
-    if (const NamedPattern* const found = find(name.substr(0, end))) {
-      PatternCanvas canvas;
-      found->draw(canvas, number);
-      return canvas.texels();
-    }
+    if (const NamedPattern* const found = find(name.substr(0, end))) return {found, number};
   }
-  return std::nullopt;
+  return {};
+}
+
+}  // namespace
+
+bool has_pattern(std::string_view name) {
+  return find_pattern(name).first != nullptr;
+}
+
+std::optional<Pattern> draw_pattern(std::string_view name) {
+  const auto [found, number] = find_pattern(name);
+  if (found == nullptr) return std::nullopt;
+  PatternCanvas canvas;
+  found->draw(canvas, number);
+  return canvas.texels();
 }
 
 }  // namespace quoin::packs

@@ -26,6 +26,7 @@ using Pattern = std::array<PatternTexel, kPatternSize * kPatternSize>;
 /// Draws a pattern by name: "planks", or "wheat5" for a pattern with a number. Patterns of whole faces repeat without
 /// seams. Returns nullopt for unknown names. Cost: some 10 us.
 [[nodiscard]] std::optional<Pattern> draw_pattern(std::string_view name);
+[[nodiscard]] bool has_pattern(std::string_view name);
 
 /// A drawing of 16x16 texels. Columns count from the left, rows from the top; positions outside have no effect.
 class PatternCanvas {
