@@ -138,7 +138,8 @@ struct BlockFamilies::Parser {
     std::tie(look, turn) = split(look, '/');
     std::tie(face.variable, uv) = split(look, '@');
     if (face.variable.empty()) return fault("the face " + token + " has no texture");
-    if (!uv.empty() && !(face.uv = family_numbers<4>(uv, 0.0F, 16.0F))) return fault("invalid texture part " + uv);
+    if (!uv.empty()) face.uv = family_numbers<4>(uv, 0.0F, 16.0F);
+    if (!uv.empty() && !face.uv) return fault("invalid texture part " + uv);
     if (!turn.empty()) {
       const auto degrees = parse_float(turn);
       if (!degrees || (*degrees != 90.0F && *degrees != 180.0F && *degrees != 270.0F)) {
@@ -458,7 +459,7 @@ BlockFamilies::Found BlockFamilies::find(const PackName& block, int depth) const
 }
 
 std::string BlockFamilies::texture_of_material(const Found& found, std::string_view side) const {
-  static const std::map<std::string_view, std::vector<std::string_view>> kVariables = {
+  static const std::map<std::string_view, std::vector<std::string_view>> known_variables = {
       {"top", {"top", "end", "all", "side"}},
       {"bottom", {"bottom", "end", "top", "all", "side"}},
       {"side", {"side", "all", "front"}},
@@ -473,8 +474,9 @@ std::string BlockFamilies::texture_of_material(const Found& found, std::string_v
   for (const auto& [name, is_listed] : candidates) {
     const Found material = find({found.block.space, name});
     if (material.is_fallback || !material.family->is_full || (is_listed && !material.is_exact)) continue;
-    const auto variables = kVariables.find(side);
-    for (const std::string_view variable : variables != kVariables.end() ? variables->second : kVariables.at("side")) {
+    const auto variables = known_variables.find(side);
+    for (const std::string_view variable :
+         variables != known_variables.end() ? variables->second : known_variables.at("side")) {
       for (const auto& [key, value] : material.rule->textures) {
         if (key == variable) return texture(material, value);
       }
@@ -511,7 +513,9 @@ std::string BlockFamilies::block_state(const PackName& block) const {
       continue;
     }
     std::string key;
-    for (const auto& [property, value] : state.when) key += (key.empty() ? "" : ",") + property + "=" + value;
+    for (const auto& [property, value] : state.when) {
+      key.append(key.empty() ? "" : ",").append(property).append("=").append(value);
+    }
     file["variants"][key] = std::move(apply);
   }
   return file.dump();
@@ -519,7 +523,7 @@ std::string BlockFamilies::block_state(const PackName& block) const {
 
 std::string BlockFamilies::model_json(const std::vector<Box>& boxes, const Pairs& textures,
                                       const std::vector<std::string>& tinted) const {
-  static const std::map<char, std::tuple<const char*, int, bool>> kSides = {
+  static const std::map<char, std::tuple<const char*, int, bool>> sides = {
       {'n', {"north", 2, false}}, {'s', {"south", 2, true}}, {'e', {"east", 0, true}},
       {'w', {"west", 0, false}},  {'u', {"up", 1, true}},    {'d', {"down", 1, false}}};
   Json file = Json::object();
@@ -529,7 +533,7 @@ std::string BlockFamilies::model_json(const std::vector<Box>& boxes, const Pairs
     if (!box.turn.empty()) element["rotation"] = Json::parse(box.turn);
     if (!box.has_shade) element["shade"] = false;
     for (const auto& [letter, face] : box.faces) {
-      const auto& [name, axis, is_high] = kSides.at(letter);
+      const auto& [name, axis, is_high] = sides.at(letter);
       Json side = {{"texture", "#" + face.variable}};
       if (face.uv) side["uv"] = *face.uv;
       if (face.turn != 0) side["rotation"] = face.turn;

@@ -106,6 +106,16 @@ std::string put(std::string text, const std::string& old, const std::string& by)
   return text;
 }
 
+std::vector<std::string> texts_between_blanks(const std::string& text) {
+  std::vector<std::string> parts;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find(' ', at), text.size());
+    if (end > at) parts.push_back(text.substr(at, end - at));
+    at = end + 1;
+  }
+  return parts;
+}
+
 /// Splits "assets/SPACE/FOLDER/NAME.END" into SPACE and NAME.
 std::optional<PackName> name_in(std::string_view path, std::string_view folder, std::string_view end) {
   constexpr std::string_view kTop = "assets/";
@@ -141,13 +151,8 @@ Result<TextureRecipes> TextureRecipes::from_text(std::string_view table) {
     for (std::size_t i = 0; i < row.size(); ++i) {
       if (!row[i].is_string()) return fault("must be texts");
       if (i == 0) continue;
-      std::string text = row[i].get<std::string>();
-      std::vector<std::string> parts;
-      for (std::size_t at = 0; at < text.size();) {
-        const std::size_t end = std::min(text.find(' ', at), text.size());
-        if (end > at) parts.push_back(text.substr(at, end - at));
-        at = end + 1;
-      }
+      const auto text = row[i].get<std::string>();
+      const std::vector<std::string> parts = texts_between_blanks(text);
       if (parts.size() < 2 || parts.size() > 4) return fault("a layer is a pattern, a colour and factors: " + text);
       if (!has_pattern(parts[0])) return fault("no pattern " + parts[0]);
       if (parts[1][0] == '#' && !parse_colour(parts[1])) return fault("invalid colour " + parts[1]);
@@ -160,8 +165,9 @@ Result<TextureRecipes> TextureRecipes::from_text(std::string_view table) {
       }
       layers.push_back(std::move(layer));
     }
-    if (auto status = made.names_.add(row[0].get<std::string>(), made.rows_.size()); !status) {
-      return fault(status.error().message);
+    for (const std::string& name : texts_between_blanks(row[0].get<std::string>())) {
+      NamePatterns& names = name.find('/') == std::string::npos ? made.names_ : made.names_in_folders_;
+      if (auto status = names.add(name, made.rows_.size()); !status) return fault(status.error().message);
     }
     made.rows_.push_back(std::move(layers));
   }
@@ -172,7 +178,8 @@ std::optional<AlphaImage> TextureRecipes::draw(const PackName& texture) const {
   constexpr std::string_view kFolder = "block/";
   if (!texture.name.starts_with(kFolder)) return std::nullopt;
   PackName name{texture.space, texture.name.substr(kFolder.size())};
-  auto match = names_.find(name.name);
+  const bool is_in_folder = name.name.find('/') != std::string::npos;
+  auto match = is_in_folder ? names_in_folders_.find(name.name) : names_.find(name.name);
   if (!match && texture.space == "quoin") {  // "quoin:block/SPACE/NAME": of an unknown block
     const std::size_t slash = name.name.find('/');
     if (slash != std::string::npos) name = {name.name.substr(0, slash), name.name.substr(slash + 1)};

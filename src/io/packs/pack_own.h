@@ -37,6 +37,7 @@ class TextureRecipes {
 
   std::vector<std::vector<Layer>> rows_;
   NamePatterns names_;
+  NamePatterns names_in_folders_;  // with '/'
 };
 
 /// The files of the own pack. They are made when they are read: the same bytes every time.

@@ -204,6 +204,18 @@ TEST(OwnPack, PlainTexturesHaveTheMeanColourOfTheirBlock) {
   EXPECT_FALSE(is_near(mean_of(own_texture("oak_planks")), minecraft::look_of_block("stone", false, false).colour));
 }
 
+TEST(OwnPack, TexturesInFoldersHaveTheirOwnRecipes) {
+  const auto made = TextureRecipes::from_text(
+      R"([["*_wool", "flat #FF0000"], ["bed/*", "flat #00FF00"], ["unknown", "flat #0000FF"]])");
+  ASSERT_TRUE(made);
+  const auto colour = [&](const PackName& name) { return made->draw(name)->rgba; };
+  EXPECT_GT(colour({"quoin", "block/bed/red_wool"})[1], 200);  // by its folder
+  EXPECT_GT(colour({"minecraft", "block/red_wool"})[0], 200);  // by its name
+  EXPECT_GT(colour({"quoin", "block/mod/red_wool"})[0], 200);  // of a block of a mod
+  EXPECT_GT(colour({"quoin", "block/mod/machine"})[2], 200);   // unknown
+  EXPECT_FALSE(made->draw({"minecraft", "block/bed2/red_wool"}));
+}
+
 TEST(OwnPack, TexturesAreDrawnTheSameEveryTime) {
   EXPECT_EQ(own_texture("oak_log").rgba, own_texture("oak_log").rgba);
   EXPECT_NE(own_texture("oak_log").rgba, own_texture("oak_planks").rgba);

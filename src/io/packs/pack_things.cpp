@@ -209,8 +209,8 @@ void draw_lid(ThingCanvas& c, int y) {
 }
 
 void draw_pillow(ThingCanvas& c, int) {
-  c.box(1, 8, 15, 15, 0.88F);
-  c.bevel(1, 8, 15, 15, 0.95F, 0.75F);
+  c.box(1, 1, 15, 8, 0.88F);
+  c.bevel(1, 1, 15, 8, 0.95F, 0.75F);
 }
 
 void draw_blanket_edge(ThingCanvas& c, int) {
