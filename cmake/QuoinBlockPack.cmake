@@ -1,5 +1,5 @@
-# Embeds the tables of Quoin's own block pack (src/io/packs/data) in a target: src/io/packs/pack_own.cpp includes each as
-# a string literal. `root`: the top of the repository. As a script, `cmake -DINPUT=FILE -DOUTPUT=FILE -P
+# Embeds the tables of Quoin's own block pack (src/io/packs/data) in a target: src/io/packs/pack_own.cpp includes each
+# as a string literal. `root`: the top of the repository. As a script, `cmake -DINPUT=FILE -DOUTPUT=FILE -P
 # QuoinBlockPack.cmake` writes one literal.
 if(CMAKE_SCRIPT_MODE_FILE)
   file(READ "${INPUT}" text)

@@ -128,8 +128,8 @@ struct BlockFamilies::Parser {
     return make_error(ErrorCode::BadFormat, context + ": " + reason);
   }
 
-  /// Parses "nsew:side@0,0,16,8/90": the letters of directions, '*' for all and 'h' for the four sides, then the texture
-  /// variable, the part of the texture and its turn. '-' instead of a variable removes the faces.
+  /// Parses "nsew:side@0,0,16,8/90": the letters of directions, '*' for all and 'h' for the four sides, then the
+  /// texture variable, the part of the texture and its turn. '-' instead of a variable removes the faces.
   Status faces(const std::string& token, Box& box) const {
     auto [letters, look] = split(token, ':');
     Face face;
@@ -241,8 +241,7 @@ struct BlockFamilies::Parser {
     return {};
   }
 
-  /// Adds the turned versions of a state: "facing:north" means one per value of `facing`, and that the model is made for
-  /// north.
+  /// Adds the turned versions of a state: "facing:north" means one per value of `facing`, of a model made for north.
   Status spin(const std::string& kind, const std::string& base, const State& state, Family& family) const {
     const auto add = [&](const std::string& key, std::string_view value, int x, int y, const std::string& model) {
       State turned = state;

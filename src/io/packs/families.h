@@ -28,8 +28,8 @@ struct PackName {
 /// Splits "minecraft:oak_stairs"; names without a namespace are Minecraft's.
 [[nodiscard]] PackName pack_name(std::string_view text);
 
-/// Returns the texts that the stars of a pattern stand for, in order; nullopt if the pattern does not match. Stars match
-/// at least one character, as few as possible. A pattern has at most two stars.
+/// Returns the texts that the stars of a pattern stand for, in order; nullopt if the pattern does not match. Stars
+/// match at least one character, as few as possible. A pattern has at most two stars.
 [[nodiscard]] std::optional<std::vector<std::string>> match_name(std::string_view pattern, std::string_view name);
 
 /// Rows of a table that are selected by patterns of names: exact names first, then the first matching pattern.

@@ -58,7 +58,7 @@ Rgba8 colour_of_block(const PackName& block) {
   return minecraft::look_of_block(block.space + ":" + name, false, false).colour;
 }
 
-/// Returns the gain at which the greys, clamped to 1, have this weighted mean.
+/// Returns the gain that gives the greys, clamped to 1, this weighted mean.
 float gain_for(const std::vector<std::pair<float, float>>& greys_and_weights, float mean) {
   float low = 0.0F;
   float high = 1'024.0F;

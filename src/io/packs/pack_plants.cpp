@@ -46,7 +46,7 @@ void draw_frond(PlantCanvas& c, float x0, float y0, float x1, float y1, float wi
     const float t = static_cast<float>(k) / static_cast<float>(std::max(steps, 1));
     const int x = static_cast<int>(x0 + (x1 - x0) * t);
     const int y = static_cast<int>(y0 + (y1 - y0) * t);
-    const int reach = static_cast<int>(width * std::sin(3.14F * std::min(1.0F, 0.15F + t)) + 0.5F);
+    const int reach = static_cast<int>(std::lround(width * std::sin(3.14F * std::min(1.0F, 0.15F + t))));
     if (k % 2 == 0) {
       for (int r = 1; r <= reach; ++r) {
         c.set(x - r, y + r / 2, 0.90F - 0.08F * static_cast<float>(r));
@@ -472,7 +472,7 @@ void draw_pad(PlantCanvas& c, int) {
 void draw_spawn(PlantCanvas& c, int number) {
   for (int i = 0; i < 9; ++i) {
     const float x = 3.0F + 5.0F * static_cast<float>(i % 3) + PlantCanvas::random(i, 1, 521);
-    const float y = 3.0F + 5.0F * static_cast<float>(i / 3) + PlantCanvas::random(i, 2, 521);
+    const float y = 3.0F + 5.0F * static_cast<float>(i - i % 3) / 3.0F + PlantCanvas::random(i, 2, 521);
     c.disc(x, y, number == 0 ? 2.4F : 1.0F, 0.8F, 0.3F);
   }
 }
@@ -481,7 +481,7 @@ void draw_spawn(PlantCanvas& c, int number) {
 void draw_quarter_flowers(PlantCanvas& c, int number) {
   for (int i = 0; i < 4; ++i) {
     const float x = 4.0F + 8.0F * static_cast<float>(i % 2);
-    const float y = 4.0F + 8.0F * static_cast<float>(i / 2);
+    const float y = 4.0F + 8.0F * static_cast<float>(i - i % 2) / 2.0F;
     if (number == 1) {
       c.disc(x, y, 0.9F, 0.9F, 0.0F);
       continue;
