@@ -114,8 +114,8 @@ void add_pack_option(CLI::App& command, LoadOptions& load) {
   command
       .add_option_function<std::vector<std::string>>(
           "--pack", [&load](const std::vector<std::string>& packs) { load.packs.assign(packs.begin(), packs.end()); },
-          "Resource pack of Minecraft for shapes and textures of its blocks: a folder, zip file or client .jar; can be "
-          "given several times, later packs override earlier ones")
+          "Resource pack of Minecraft for shapes and textures of its blocks: a folder, zip file or client .jar, or "
+          "builtin for Quoin's own pack; can be given several times, later packs override earlier ones")
       ->type_name("PATH")
       ->expected(1)
       ->allow_extra_args(false)

@@ -13,6 +13,10 @@
 
 namespace [[gnu::visibility("default")]] quoin {
 
+/// The name of Quoin's own pack in BlockPacks::open and LoadOptions::packs. It has shapes and textures for every block
+/// name, also of mods; docs/formats/block_pack.md describes it. A folder of this name is "./builtin".
+inline constexpr const char* kBuiltinPack = "builtin";
+
 /// The counts of BlockPacks::apply, over all calls.
 struct BlockPackReport {
   std::size_t types = 0;             ///< Minecraft blocks
@@ -38,8 +42,9 @@ struct BlockPackReport {
 /// Threads:  any number may call `apply` at once.
 class BlockPacks {
  public:
-  /// Opens packs: folders, zip files or .jar files. Errors: CannotRead, BadFormat; InvalidArgument if a pack has no
-  /// folder `assets`; Unsupported in builds without worlds of games; LimitExceeded above 2 GiB.
+  /// Opens packs: folders, zip files or .jar files. kBuiltinPack, at any place, gives a look to the blocks that the
+  /// other packs do not have. Errors: CannotRead, BadFormat; InvalidArgument if a pack has no folder `assets`;
+  /// Unsupported in builds without worlds of games; LimitExceeded above 2 GiB.
   [[nodiscard]] static Result<std::shared_ptr<BlockPacks>> open(std::span<const std::filesystem::path> paths);
   /// As above, from the bytes of zip files.
   [[nodiscard]] static Result<std::shared_ptr<BlockPacks>> open(std::vector<std::vector<std::byte>> zips);

@@ -9,6 +9,7 @@
 #include "io/packs/pack_files.h"
 #ifndef QUOIN_WITHOUT_GAME_WORLDS
 #include "io/packs/pack_looks.h"
+#include "io/packs/pack_own.h"
 #endif
 
 namespace quoin {
@@ -93,14 +94,19 @@ Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::vector<std::vector<std
 #else
 
 struct BlockPacks::Content {
-  explicit Content(std::shared_ptr<const packs::PackFiles> files) : looks(std::move(files)) {}
+  explicit Content(std::shared_ptr<const packs::PackFiles> files, std::shared_ptr<const packs::PackFiles> own = nullptr)
+      : looks(std::move(files), std::move(own)) {}
   packs::BlockLooks looks;
 };
 
 Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::span<const std::filesystem::path> paths) {
-  auto files = packs::PackStack::open(paths);
+  std::vector<std::filesystem::path> named(paths.begin(), paths.end());
+  const bool has_own = std::erase(named, std::filesystem::path(kBuiltinPack)) > 0;
+  auto files = packs::PackStack::open(named);
   if (!files) return files.error();
-  return std::shared_ptr<BlockPacks>(new BlockPacks(std::make_unique<Content>(std::move(*files))));
+  std::shared_ptr<const packs::PackFiles> own;
+  if (has_own) own = packs::OwnPack::instance();
+  return std::shared_ptr<BlockPacks>(new BlockPacks(std::make_unique<Content>(std::move(*files), std::move(own))));
 }
 
 Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::vector<std::vector<std::byte>> zips) {

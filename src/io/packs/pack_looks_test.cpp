@@ -530,5 +530,17 @@ TEST(BlockPacks, AppliesToRegistries) {
   EXPECT_EQ((*packs)->report().types, 1U);
 }
 
+TEST(BlockPacks, BuiltinPackHasEveryBlock) {
+  const std::filesystem::path names[] = {kBuiltinPack};
+  const auto packs = BlockPacks::open(names);
+  ASSERT_TRUE(packs) << packs.error().message;
+  const VoxelProperties stone = (*packs)->applied(block("minecraft:stone").type);
+  EXPECT_FALSE(stone.faces.empty());
+  EXPECT_TRUE(stone.shapes.empty());
+  EXPECT_FALSE((*packs)->applied(block("mod:purple_fence").type).shapes.empty());
+  EXPECT_EQ((*packs)->report().types, 2U);
+  EXPECT_EQ((*packs)->report().without_look, 0U) << to_string((*packs)->report());
+}
+
 }  // namespace
 }  // namespace quoin::packs

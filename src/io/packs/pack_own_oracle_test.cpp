@@ -33,8 +33,10 @@ using Values = std::map<std::string, std::string>;
 // The version of the goal, and a later one whose blocks the rules were not written for.
 constexpr std::array<const char*, 2> kVersions = {"1.21.4", "26.1"};
 
+constexpr const char* kInstall = "needs 500 MB: npm install --prefix build/oracle minecraft-data@3.119.0";
+
 fs::path data_folder(const std::string& version = kVersions[0]) {
-  return fs::path(QUOIN_SOURCE_DIR) / "tests/web/node_modules/minecraft-data/minecraft-data/data/pc" / version;
+  return fs::path(QUOIN_SOURCE_DIR) / "build/oracle/node_modules/minecraft-data/minecraft-data/data/pc" / version;
 }
 
 Json parsed(const fs::path& file) {
@@ -187,7 +189,7 @@ const std::map<std::string, std::string> kLess = {
 const std::set<std::string> kInvisible = {"air", "cave_air", "void_air", "structure_void", "barrier", "light"};
 
 TEST(OwnPackOracle, DrawsCubesExactlyWhereBlocksAreCubes) {
-  if (!fs::exists(data_folder())) GTEST_SKIP() << "npm install --prefix tests/web minecraft-data";
+  if (!fs::exists(data_folder())) GTEST_SKIP() << kInstall;
   for (const std::string version : kVersions) {
     const Json blocks = parsed(data_folder(version) / "blocks.json");
     const Json shapes = parsed(data_folder(version) / "blockCollisionShapes.json");
@@ -212,7 +214,7 @@ TEST(OwnPackOracle, DrawsCubesExactlyWhereBlocksAreCubes) {
 }
 
 TEST(OwnPackOracle, EveryStateHasElements) {
-  if (!fs::exists(data_folder())) GTEST_SKIP() << "npm install --prefix tests/web minecraft-data";
+  if (!fs::exists(data_folder())) GTEST_SKIP() << kInstall;
   for (const std::string version : kVersions) {
     Reader reader;
     std::set<std::string> problems;
@@ -240,7 +242,7 @@ TEST(OwnPackOracle, EveryStateHasElements) {
 }
 
 TEST(OwnPackOracle, EveryTypeHasALook) {
-  if (!fs::exists(data_folder())) GTEST_SKIP() << "npm install --prefix tests/web minecraft-data";
+  if (!fs::exists(data_folder())) GTEST_SKIP() << kInstall;
   minecraft::BlockTypes types;
   for (const Json& block : parsed(data_folder() / "blocks.json")) {
     const auto name = "minecraft:" + block["name"].get<std::string>();
@@ -344,7 +346,7 @@ constexpr std::array<std::string_view, 12> kEqualFamilies = {"_stairs", "_slab",
                                                              "cactus",  "cocoa", "repeater", "farmland"};
 
 TEST(OwnPackOracle, ShapesFollowCollisionBoxesInAllStates) {
-  if (!fs::exists(data_folder())) GTEST_SKIP() << "npm install --prefix tests/web minecraft-data";
+  if (!fs::exists(data_folder())) GTEST_SKIP() << kInstall;
   const Json shapes = parsed(data_folder() / "blockCollisionShapes.json");
   Reader reader;
   std::set<std::string> problems;
