@@ -75,7 +75,6 @@ void write_large_schematic(const std::filesystem::path& path) {
 
 class ToolMinecraft : public ToolTest {};
 
-// A byte array of the blocks with their indices would take 3 GB.
 TEST_F(ToolMinecraft, PacksGiveBlocksTextures) {
   // A region with stone and stairs, and a pack with a look for stone.
   namespace fs = std::filesystem;
@@ -117,11 +116,27 @@ TEST_F(ToolMinecraft, PacksGiveBlocksTextures) {
   ASSERT_EQ(run("convert plain.quoin packed.quoin --pack pack -q").status, 0);
   EXPECT_EQ(colour_in("packed.quoin"), (Rgba8{200, 30, 20}));
   EXPECT_NE(run("info r.0.0.mca --pack pack").err.find("without a look"), std::string::npos);
+  // Images show the own pack, also below others, unless it is refused. Worlds keep the looks they were converted with.
+  const auto image_of = [&](const std::string& file, const std::string& packs) {
+    const ToolRun run_of = run("render " + file + " -o a.png --size 64x48 --samples 1 -q " + packs);
+    EXPECT_EQ(run_of.status, 0) << run_of.err;
+    EXPECT_EQ(run_of.err, "");
+    return text_of(folder_.file("a.png"));
+  };
+  const std::string own = image_of("r.0.0.mca", "");
+  EXPECT_EQ(own, image_of("r.0.0.mca", "--pack builtin"));
+  EXPECT_NE(own, image_of("r.0.0.mca", "--pack none"));
+  const std::string both = image_of("r.0.0.mca", "--pack pack");
+  EXPECT_NE(both, own);
+  EXPECT_NE(both, image_of("r.0.0.mca", "--pack none"));
+  EXPECT_EQ(image_of("plain.quoin", ""), own);
+  EXPECT_NE(image_of("packed.quoin", ""), own);
   const ToolRun refused = run("render r.0.0.mca -o a.png --pack w.quoin");
   EXPECT_EQ(refused.status, 1);
   EXPECT_NE(refused.err.find("w.quoin: byte 0: not a resource pack"), std::string::npos) << refused.err;
 }
 
+// A byte array of the blocks with their indices would take 3 GB.
 TEST_F(ToolMinecraft, CountsBillionBlocksInLittleMemory) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "sanitizers take more addresses than the limit";

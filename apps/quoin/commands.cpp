@@ -6,6 +6,8 @@
 #include <optional>
 #include <string>
 
+#include <quoin/io/block_packs.h>
+
 #include "options.h"
 #include "output.h"
 
@@ -110,12 +112,27 @@ void add_dimension_option(CLI::App& command, LoadOptions& load) {
           [](const std::string& text) { return std::string(text.empty() ? "must name a dimension" : ""); }, ""));
 }
 
-void add_pack_option(CLI::App& command, LoadOptions& load) {
+void add_pack_option(CLI::App& command, LoadOptions& load, PlainBlocks plain) {
+  std::string help =
+      "Resource pack of Minecraft for shapes and textures of its blocks: a folder, zip file or client .jar, or builtin "
+      "for Quoin's own pack; can be given several times, later packs override earlier ones";
+  if (plain == PlainBlocks::OwnPack) {
+    load.packs = {kBuiltinPack};
+    help += " (default builtin, which also has the blocks that other packs lack; none: cubes)";
+  }
   command
       .add_option_function<std::vector<std::string>>(
-          "--pack", [&load](const std::vector<std::string>& packs) { load.packs.assign(packs.begin(), packs.end()); },
-          "Resource pack of Minecraft for shapes and textures of its blocks: a folder, zip file or client .jar, or "
-          "builtin for Quoin's own pack; can be given several times, later packs override earlier ones")
+          "--pack",
+          [&load, plain](const std::vector<std::string>& packs) {
+            load.packs.assign(packs.begin(), packs.end());
+            if (plain == PlainBlocks::Cubes) return;
+            if (packs == std::vector<std::string>{"none"}) {
+              load.packs.clear();
+            } else {
+              load.packs.emplace_back(kBuiltinPack);
+            }
+          },
+          help)
       ->type_name("PATH")
       ->expected(1)
       ->allow_extra_args(false)
@@ -123,7 +140,7 @@ void add_pack_option(CLI::App& command, LoadOptions& load) {
       ->check(file_name());
 }
 
-void add_common_options(CLI::App& command, CommonOptions& options) {
+void add_common_options(CLI::App& command, CommonOptions& options, PlainBlocks plain) {
   command.add_option("IN", options.input, "File to read, or - for standard input")->required()->check(file_name());
   set_heading(command, heading::kInput);
   command.add_flag("--hidden", options.load.show_hidden, "Include hidden layers and nodes");
@@ -138,7 +155,7 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
                   "NAME.quoin converts all of a world")
       ->check(CLI::Range(0, 1'000));
   add_dimension_option(command, options.load);
-  add_pack_option(command, options.load);
+  add_pack_option(command, options.load, plain);
   set_heading(command, heading::kHeights);
   add_height_options(command, options.load.heights);
   set_heading(command, heading::kGeneral);

@@ -36,11 +36,16 @@ struct CommonOptions {
 
 /// Adds --dimension.
 void add_dimension_option(CLI::App& command, LoadOptions& load);
-/// Adds --pack, which can be given several times.
-void add_pack_option(CLI::App& command, LoadOptions& load);
+/// The look of Minecraft blocks without --pack.
+enum class PlainBlocks : std::uint8_t {
+  Cubes,    ///< cubes of one colour: for files that other programs read
+  OwnPack,  ///< as in kBuiltinPack, which also lies below other packs: for images
+};
 
+/// Adds --pack, which can be given several times.
+void add_pack_option(CLI::App& command, LoadOptions& load, PlainBlocks plain);
 /// Adds IN and the options of CommonOptions to a command.
-void add_common_options(CLI::App& command, CommonOptions& options);
+void add_common_options(CLI::App& command, CommonOptions& options, PlainBlocks plain);
 
 /// Adds --allow-outside-files.
 void add_outside_files_option(CLI::App& command, LoadOptions& options);

@@ -391,7 +391,7 @@ void add_info_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand(
       "info", "Print the contents of a file: grids, sizes, voxels, faces, types, transforms, values of volumes");
   const auto options = std::make_shared<CommonOptions>();
-  add_common_options(*command, *options);
+  add_common_options(*command, *options, PlainBlocks::Cubes);
   add_raw_options(*command, options->load.raw);
   command->footer(readable_files() +
                   "Faces are counted once per model; only models that are placed and visible count.\n"

@@ -125,7 +125,7 @@ void add_view_command(CLI::App& app, int& status) {
   set_heading(*command, heading::kInput);
   command->add_flag("--hidden", arguments->load.show_hidden, "Include hidden layers and nodes");
   add_dimension_option(*command, arguments->load);
-  add_pack_option(*command, arguments->load);
+  add_pack_option(*command, arguments->load, PlainBlocks::OwnPack);
   add_outside_files_option(*command, arguments->load);
   command->add_option("--frame", arguments->load.frame, "Animation frame (default 0)")->check(not_negative_whole());
   add_volume_options(*command, arguments->load);

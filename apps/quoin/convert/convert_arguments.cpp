@@ -296,7 +296,7 @@ Status check_capabilities(const CLI::App& command, const ConvertArguments& argum
 
 void add_convert_options(CLI::App& command, ConvertArguments& arguments) {
   ConvertOptions& options = arguments.options;
-  add_common_options(command, options.common);
+  add_common_options(command, options.common, PlainBlocks::Cubes);
   add_file_options(command, arguments);
   add_meshing_options(command, options);
   add_mesh_file_options(command, options);

@@ -399,7 +399,7 @@ DVec3 RenderArguments::forward() const {
 
 void add_render_options(CLI::App& command, RenderArguments& arguments) {
   arguments.render.light = natural_light();
-  add_common_options(command, arguments.common);
+  add_common_options(command, arguments.common, PlainBlocks::OwnPack);
   add_output_options(command, arguments);
   add_camera_options(command, arguments);
   add_series_options(command, arguments);

@@ -166,7 +166,7 @@ int run_thumbnail(ThumbnailArguments& arguments) {
 void add_thumbnail_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand("thumbnail", "Write a small image quickly, for lists and file managers");
   const auto arguments = std::make_shared<ThumbnailArguments>();
-  add_common_options(*command, arguments->common);
+  add_common_options(*command, arguments->common, PlainBlocks::OwnPack);
   command->add_option("OUT", arguments->output, "Image to write: .png with a transparent background")
       ->required()
       ->check(file_name());

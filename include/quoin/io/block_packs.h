@@ -14,7 +14,8 @@
 namespace [[gnu::visibility("default")]] quoin {
 
 /// The name of Quoin's own pack in BlockPacks::open and LoadOptions::packs. It has shapes and textures for every block
-/// name, also of mods; docs/formats/block_pack.md describes it. A folder of this name is "./builtin".
+/// name, also of mods, except for types with textures or shapes. docs/formats/block_pack.md describes it. A folder of
+/// this name is "./builtin".
 inline constexpr const char* kBuiltinPack = "builtin";
 
 /// The counts of BlockPacks::apply, over all calls.

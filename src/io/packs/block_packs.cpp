@@ -1,6 +1,9 @@
 #include <quoin/io/block_packs.h>
 
+#include <algorithm>
 #include <mutex>
+#include <optional>
+#include <string_view>
 #include <utility>
 
 #include <quoin/core/assert.h>
@@ -83,8 +86,12 @@ Error packs_left_out() {
 
 }  // namespace
 
-Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::span<const std::filesystem::path> /*paths*/) {
-  return packs_left_out();
+Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::span<const std::filesystem::path> paths) {
+  const std::filesystem::path own(kBuiltinPack);
+  const bool has_others = std::ranges::any_of(paths, [&](const std::filesystem::path& path) { return path != own; });
+  // Without readers of blocks there are none to give a look to.
+  return has_others ? Result<std::shared_ptr<BlockPacks>>(packs_left_out())
+                    : std::shared_ptr<BlockPacks>(new BlockPacks(std::make_unique<Content>()));
 }
 
 Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::vector<std::vector<std::byte>> /*zips*/) {
@@ -92,6 +99,19 @@ Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::vector<std::vector<std
 }
 
 #else
+
+namespace {
+
+/// The own pack, whose tables are parsed when the first file is read: many scenes have no blocks.
+class LazyOwnPack final : public packs::PackFiles {
+ public:
+  [[nodiscard]] Result<std::optional<std::vector<std::byte>>> read(std::string_view path,
+                                                                   std::size_t max_bytes) const override {
+    return packs::OwnPack::instance()->read(path, max_bytes);
+  }
+};
+
+}  // namespace
 
 struct BlockPacks::Content {
   explicit Content(std::shared_ptr<const packs::PackFiles> files, std::shared_ptr<const packs::PackFiles> own = nullptr)
@@ -105,7 +125,7 @@ Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::span<const std::filesy
   auto files = packs::PackStack::open(named);
   if (!files) return files.error();
   std::shared_ptr<const packs::PackFiles> own;
-  if (has_own) own = packs::OwnPack::instance();
+  if (has_own) own = std::make_shared<const LazyOwnPack>();
   return std::shared_ptr<BlockPacks>(new BlockPacks(std::make_unique<Content>(std::move(*files), std::move(own))));
 }
 

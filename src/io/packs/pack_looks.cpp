@@ -579,6 +579,8 @@ VoxelProperties BlockLooks::applied(const VoxelProperties& type) {
   std::string reason = "not in the packs";
   for (PackLibrary* const library : {&library_, own_library_ ? &*own_library_ : nullptr}) {
     if (library == nullptr) continue;
+    // A world that was converted with a pack keeps its looks.
+    if (library != &library_ && (!type.faces.empty() || !type.shapes.empty())) return type;
     auto made = Maker(*this, *library, type).make();
     if (!made) {
       reason = to_string(made.error());

@@ -540,6 +540,12 @@ TEST(BlockPacks, BuiltinPackHasEveryBlock) {
   EXPECT_FALSE((*packs)->applied(block("mod:purple_fence").type).shapes.empty());
   EXPECT_EQ((*packs)->report().types, 2U);
   EXPECT_EQ((*packs)->report().without_look, 0U) << to_string((*packs)->report());
+  // Looks that another pack gave stay.
+  const auto red = BlockPacks::open(std::vector<std::vector<std::byte>>{zip_of_stone_and_stairs()});
+  ASSERT_TRUE(red);
+  const VoxelProperties red_stone = (*red)->applied(block("minecraft:stone").type);
+  ASSERT_FALSE(red_stone.faces == stone.faces);
+  EXPECT_EQ((*packs)->applied(red_stone), red_stone);
 }
 
 }  // namespace
