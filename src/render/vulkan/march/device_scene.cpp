@@ -303,8 +303,13 @@ Result<ShaderShape> DeviceShapes::shape_of(const PlacedShape& shape) {
 Result<std::uint32_t> DeviceShapes::index_of(const ShapeModel& model, VoxelType type, const VoxelShapes& owner) {
   const auto known = models_.find({&model, type});
   if (known != models_.end()) return known->second.first;
+  const std::size_t before = vectors_.size();
   const Result<std::uint32_t> first = add(model, (*types_)[type]);
-  if (first) models_[{&model, type}] = {*first, owner};
+  if (first) {
+    models_[{&model, type}] = {*first, owner};
+  } else {
+    vectors_.resize(before);
+  }
   return first;
 }
 
@@ -396,17 +401,20 @@ Status DeviceShapes::add_side(const ModelFace& face, const ShapeModel& model, co
 Status DeviceShapes::send() {
   if (sent_ == vectors_.size()) return {};
   if (vectors_.size() * sizeof(Vec4) > place_.size) {
-    memory_->release(place_);
-    sent_ = 0;
     // Half as much again, as for trees.
     const std::size_t bytes = vectors_.size() * sizeof(Vec4);
-    const auto place = memory_->allocate(bytes + bytes / 2, "uploading shapes");
-    if (!place) return place.error();
-    place_ = *place;
+    const auto larger = memory_->allocate(bytes + bytes / 2, "uploading shapes");
+    if (!larger) return larger.error();
+    memory_->release(place_);
+    place_ = *larger;
+    sent_ = 0;
   }
   const auto added = std::span(vectors_).subspan(sent_);
-  const std::size_t offset = std::exchange(sent_, vectors_.size()) * sizeof(Vec4);
-  return memory_->write(place_, std::as_bytes(added), offset);
+  Status done = memory_->write(place_, std::as_bytes(added), sent_ * sizeof(Vec4));
+  // An image that fails later discards queued writes.
+  if (done) done = memory_->flush();
+  if (done) sent_ = vectors_.size();
+  return done;
 }
 
 void DeviceShapes::clear() {

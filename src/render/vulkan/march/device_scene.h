@@ -144,7 +144,8 @@ class DeviceShapes final : public ShapeModels {
   /// model. Errors: as `shape_of`.
   [[nodiscard]] Result<std::uint32_t> side_of(const ShapeModel& model, VoxelType type, const VoxelShapes& owner,
                                               std::size_t face);
-  /// Queues the models since the last call. After an error it must be cleared.
+  /// Sends the models since the last call, with everything that is queued. If the memory is full, the models that were
+  /// sent before stay at their address.
   [[nodiscard]] Status send();
   void clear();
   /// Returns the address of the table of vectors.
@@ -222,7 +223,7 @@ class DeviceScene {
   [[nodiscard]] const std::vector<ShaderGrid>& grid_table() const { return grid_table_; }
   [[nodiscard]] std::uint64_t surfaces_address() const { return surfaces_place_.address; }
   [[nodiscard]] std::uint32_t last_surface() const { return last_surface_; }
-  /// Returns the models of shapes. Requires: a scene with shapes.
+  /// Returns the models of shapes. Requires: it was made with `texels`.
   [[nodiscard]] DeviceShapes& shapes() { return *shapes_; }
   /// Sets the addresses of the shapes in a frame.
   void put_shapes_in(ShaderFrame& frame) const;

@@ -360,6 +360,30 @@ TEST(DeviceTextures, IsEmptyAfterFailedCall) {
   }
 }
 
+// An image that shows new models may fail; the scene's models must survive that.
+TEST(DeviceShapes, KeepsSentModelsIfMemoryIsFull) {
+  VoxelRegistry types;
+  const ShapeTypes all(types);
+  QueuedMemory memory;
+  vulkan::KnownTexels known;
+  vulkan::DeviceShapes shapes(memory, known);
+  shapes.use(types);
+  const auto add = [&](VoxelType type) {
+    return static_cast<bool>(shapes.shape_of({IVec3(0), type, &types[type].shapes.model(0, {}, {})}));
+  };
+  ASSERT_TRUE(add(all.slab));
+  ASSERT_TRUE(shapes.send());
+  ASSERT_TRUE(add(all.stairs));
+  const int held = memory.held;
+  memory.left = 0;
+  EXPECT_FALSE(shapes.send());
+  EXPECT_EQ(memory.held, held);
+  memory.left = -1;
+  ASSERT_TRUE(shapes.send());
+  EXPECT_EQ(memory.held, held) << "the smaller table is released";
+  EXPECT_EQ(memory.queued, 0) << "nothing that a failed image would discard";
+}
+
 // Device memory for textures is that of their texels: 22 MB for 1,024 textures of 64 texels per side.
 TEST(DeviceTextures, TakesMemoryOfTexels) {
   VoxelRegistry types;
