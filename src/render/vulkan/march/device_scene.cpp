@@ -600,6 +600,7 @@ std::vector<Vec4> surface_table(const VoxelRegistry& types) {
 
 std::vector<Vec4> shape_means(const VoxelRegistry& types) {
   std::vector<Vec4> means;
+  means.reserve(types.size() + 1);
   for (std::size_t i = 0; i < types.size(); ++i) {
     const auto type = static_cast<VoxelType>(i);
     const Vec3 mean = types.is_shaped(type) ? mean_of_shapes(types[type]) : Vec3(-1.0F);

@@ -119,6 +119,7 @@ struct VulkanMeshRenderer::Impl {
   std::vector<Vec4> surface_table;  // the content of `surfaces`
   vulkan::Place means;              // of shapes; faces of shapes read it, also those of former types
   std::vector<Vec4> mean_table;     // its content
+  ChangeCursor followed_types;      // of both tables, unless they are empty
   bool has_unoccluding = false;     // some of its opaque types do not darken corners
   vulkan::DeviceTextures textures;  // of the same types
   vulkan::SolidFaces solid;         // of the same types
@@ -175,9 +176,14 @@ void VulkanMeshRenderer::Impl::place(const Scene& of_scene, InstanceFilter filte
 }
 
 Status VulkanMeshRenderer::Impl::put_surfaces(const VoxelRegistry& types) {
+  if (!surface_table.empty() && !types.has_changed_since(followed_types)) return {};
+  const ChangeCursor now = types.cursor();
   std::vector<Vec4> table = vulkan::surface_table(types);
   std::vector<Vec4> of_shapes = vulkan::shape_means(types);
-  if (table == surface_table && of_shapes == mean_table) return {};
+  if (table == surface_table && of_shapes == mean_table) {
+    followed_types = now;
+    return {};
+  }
   surface_table.clear();
   Status done = vulkan::put_table(*memory, surfaces, std::as_bytes(std::span(table)));
   if (done) done = vulkan::put_table(*memory, means, std::as_bytes(std::span(of_shapes)));
@@ -186,6 +192,7 @@ Status VulkanMeshRenderer::Impl::put_surfaces(const VoxelRegistry& types) {
     surface_table = std::move(table);
     mean_table = std::move(of_shapes);
     has_unoccluding = types.has_unoccluding() || types.has_shapes();
+    followed_types = now;
   } else {
     memory->discard();
   }
