@@ -283,6 +283,7 @@ Status DeviceImpostors::put(const std::shared_ptr<const Impostor>& impostor, Dev
   if (entry.next.part < kParts) return {};
   memory_->release(entry.whole.place);
   entry.whole = std::exchange(entry.next, {});
+  entry.whole.sides = {};
   return {};
 }
 

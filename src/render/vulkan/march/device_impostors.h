@@ -62,7 +62,7 @@ class DeviceImpostors {
     Place place;
     std::array<ShaderFarLevel, ImpostorFaces::kLevels + 1> levels{};  // last: faces that no view saw
     std::uint64_t faces = 0;                                          // address
-    std::vector<std::uint32_t> sides;                                 // of pieces of shapes: far.glsl; else empty
+    std::vector<std::uint32_t> sides;                                 // of pieces of shapes (far.glsl), until sent
     std::size_t part = 0;                                             // part to send next; kParts: complete
     std::size_t at = 0;                                               // position in that part
   };
