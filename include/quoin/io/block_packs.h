@@ -33,7 +33,8 @@ struct BlockPackReport {
 /// Resource packs of Minecraft (Java): the shapes and textures of blocks. Later packs override earlier ones file by
 /// file, so name the client's .jar first.
 ///
-///   auto packs = BlockPacks::open({{"client.jar", "my_pack.zip"}});
+///   const std::vector<std::filesystem::path> files = {"client.jar", "my_pack.zip"};
+///   auto packs = BlockPacks::open(files);
 ///   (*packs)->apply(loaded.scene.types);
 ///
 /// Types:    those of worlds, schematics and structures (io/formats.h), also after conversion to .quoin. Each gets
