@@ -147,7 +147,7 @@ class BlockLooks::Maker {
 
   /// Returns the type with its look; nullopt if the library has none. Errors: of files, with their path.
   Result<std::optional<VoxelProperties>> make() {
-    if (is_fluid()) {
+    if (is_fluid() && !keeps_fluid()) {
       if (auto fluid = make_fluid()) return std::optional(std::move(*fluid));
     }
     const auto found = library_.states_of(states_.block());
@@ -181,9 +181,20 @@ class BlockLooks::Maker {
                             : level->first_bit == 0 && level->kind == 'n';
   }
 
+  [[nodiscard]] std::string fluid_texture(const char* end) const {
+    return std::string(name_ == "lava" ? "block/lava" : "block/water") + end;
+  }
+
+  /// Returns true if a fluid has the look of an earlier conversion and only the own pack could replace it.
+  [[nodiscard]] bool keeps_fluid() const {
+    if (!looks_.own_library_ || (type_.faces.empty() && type_.shapes.empty())) return false;
+    const std::string path = "assets/minecraft/textures/" + fluid_texture("_still") + ".png";
+    const auto found = looks_.packs_->read(path, kMaxImageBytes);
+    return found && !*found;
+  }
+
   std::optional<VoxelProperties> make_fluid() {
-    const std::string fluid = name_ == "lava" ? "block/lava" : "block/water";
-    const auto read = [&](const char* end) { return texture_named({"minecraft", fluid + end}); };
+    const auto read = [&](const char* end) { return texture_named({"minecraft", fluid_texture(end)}); };
     const PackTexture* const still = read("_still");
     if (still == nullptr) return std::nullopt;
     const PackTexture* const flow = read("_flow");

@@ -398,6 +398,24 @@ TEST(PackLooks, OwnPackFillsModelsThatTheGameDraws) {
   EXPECT_EQ(looks.report().without_look, 0U);
 }
 
+TEST(PackLooks, OwnPackKeepsFluidsOfEarlierConversions) {
+  PackBuilder red = small_pack();
+  red.texture("block/water_still", packs_test::plain_png(kRed));
+  PackBuilder own;
+  own.texture("block/water_still", packs_test::plain_png(kGreen));
+  const VoxelProperties water = block("minecraft:water", {{"level", "0"}}).type;
+  const VoxelProperties converted = look(red, water);
+  ASSERT_FALSE(converted.faces.empty());
+  BlockLooks looks(small_pack().files(), own.files());
+  EXPECT_EQ(looks.applied(converted), converted);
+  const VoxelProperties fresh = looks.applied(water);
+  ASSERT_FALSE(fresh.faces.empty());
+  EXPECT_EQ(fresh.faces[Direction::PosY].texture.level(0)[0], kGreen);
+  // A pack that has the texture replaces the look.
+  BlockLooks both(red.files(), own.files());
+  EXPECT_EQ(both.applied(fresh).faces[Direction::PosY].texture.level(0)[0], kRed);
+}
+
 TEST(PackShapes, DefaultTexturesStayWhenTheModelTurns) {
   PackElement cube;
   for (auto& face : cube.faces) face = PackFace{.texture = "#all"};
