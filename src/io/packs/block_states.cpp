@@ -16,6 +16,8 @@ constexpr int kMaxConditionDepth = 8;
 constexpr std::size_t kMaxModelChoices = 256;
 constexpr std::size_t kMaxTerms = 64;                // of an alternative
 constexpr std::size_t kMaxAllAlternatives = 16'384;  // of a file
+// Values that a file's products may copy. A short file could otherwise repeat a long list of values many times.
+constexpr std::size_t kMaxCopiedValues = std::size_t{1} << 20;
 
 Error wrong_states(const std::string& reason) {
   return make_error(ErrorCode::BadFormat, reason);
@@ -94,13 +96,17 @@ Result<std::vector<StateModel>> state_models(const Json& json) {
   return models;
 }
 
-/// Returns the alternatives under which all of two lists hold.
-Result<Alternatives> both(const Alternatives& a, const Alternatives& b) {
+/// Returns the alternatives under which all of two lists hold. `copied`: counts the values of a file's products.
+Result<Alternatives> both(const Alternatives& a, const Alternatives& b, std::size_t& copied) {
   if (a.size() * b.size() > kMaxStateAlternatives) return too_many("alternatives of a case", kMaxStateAlternatives);
   Alternatives all;
   for (const auto& left : a) {
     for (const auto& right : b) {
       if (left.size() + right.size() > kMaxTerms) return too_many("properties in a condition", kMaxTerms);
+      for (const auto* const terms : {&left, &right}) {
+        for (const StateTerm& term : *terms) copied += term.values.size();
+      }
+      if (copied > kMaxCopiedValues) return too_many("values in the products of conditions", kMaxCopiedValues);
       all.push_back(left);
       all.back().insert(all.back().end(), right.begin(), right.end());
     }
@@ -108,21 +114,21 @@ Result<Alternatives> both(const Alternatives& a, const Alternatives& b) {
   return all;
 }
 
-Result<Alternatives> alternatives_of(const Json& json, int depth);
+Result<Alternatives> alternatives_of(const Json& json, int depth, std::size_t& copied);
 
 /// Reads the list of an OR or AND.
-Result<Alternatives> alternatives_in(const Json& list, bool is_or, int depth) {
+Result<Alternatives> alternatives_in(const Json& list, bool is_or, int depth, std::size_t& copied) {
   if (!list.is_array()) return wrong_states("OR or AND is not an array");
   if (list.size() > kMaxStateAlternatives) return too_many("alternatives of a case", kMaxStateAlternatives);
   Alternatives all;
   if (!is_or) all.emplace_back();
   for (const Json& each : list) {
-    auto one = alternatives_of(each, depth + 1);
+    auto one = alternatives_of(each, depth + 1, copied);
     if (!one) return one.error();
     if (is_or) {
       all.insert(all.end(), one->begin(), one->end());
     } else {
-      auto product = both(all, *one);
+      auto product = both(all, *one, copied);
       if (!product) return product.error();
       all = std::move(*product);
     }
@@ -131,16 +137,16 @@ Result<Alternatives> alternatives_in(const Json& list, bool is_or, int depth) {
   return all;
 }
 
-Result<Alternatives> alternatives_of(const Json& json, int depth) {
+Result<Alternatives> alternatives_of(const Json& json, int depth, std::size_t& copied) {
   if (!json.is_object()) return wrong_states("\"when\" is not an object");
   if (depth > kMaxConditionDepth) return too_many("levels of OR and AND", kMaxConditionDepth);
   Alternatives all(1);
   if (json.size() > kMaxTerms) return too_many("properties in a condition", kMaxTerms);
   for (const auto& [key, value] : json.items()) {
     if (key == "OR" || key == "AND") {
-      const auto list = alternatives_in(value, key == "OR", depth);
+      const auto list = alternatives_in(value, key == "OR", depth, copied);
       if (!list) return list.error();
-      auto product = both(all, *list);
+      auto product = both(all, *list, copied);
       if (!product) return product.error();
       all = std::move(*product);
       continue;
@@ -149,7 +155,7 @@ Result<Alternatives> alternatives_of(const Json& json, int depth) {
       return wrong_states("the value of a property is not text, a number or a truth value");
     }
     const StateTerm term = term_of(key, value.is_string() ? value.get<std::string>() : value.dump());
-    auto product = both(all, {{term}});
+    auto product = both(all, {{term}}, copied);
     if (!product) return product.error();
     all = std::move(*product);
   }
@@ -196,6 +202,7 @@ Result<BlockStates> parse_multipart(const Json& json) {
   BlockStates states;
   states.is_multipart = true;
   std::size_t alternative_count = 0;
+  std::size_t copied = 0;
   for (const Json& each : json) {
     const auto apply = each.is_object() ? each.find("apply") : each.end();
     if (!each.is_object() || apply == each.end()) return wrong_states("a part has no \"apply\"");
@@ -203,7 +210,7 @@ Result<BlockStates> parse_multipart(const Json& json) {
     if (!models) return models.error();
     Alternatives when(1);
     if (const auto condition = each.find("when"); condition != each.end()) {
-      auto alternatives = alternatives_of(*condition, 0);
+      auto alternatives = alternatives_of(*condition, 0, copied);
       if (!alternatives) return alternatives.error();
       when = std::move(*alternatives);
     }

@@ -157,6 +157,17 @@ TEST(BlockStates, LimitsProducts) {
   const auto conditions = TypeStates(block.type).conditions(states->cases[0]);
   ASSERT_FALSE(conditions);
   EXPECT_EQ(conditions.error().code, ErrorCode::LimitExceeded);
+  // A long list of values in each of many alternatives.
+  std::string values = "1";
+  std::string empty = "{}";
+  for (int i = 0; i < 10'000; ++i) values += "|1";
+  for (int i = 0; i < 1'000; ++i) empty += ",{}";
+  const auto list_of_values = [&](const std::string& alternatives) {
+    return R"({"multipart": [{"apply": {"model": "a"}, "when": {"OR": [)" + alternatives + R"(], "a": ")" + values +
+           R"("}}]})";
+  };
+  EXPECT_EQ(states_error(list_of_values("{},{}")), "");
+  EXPECT_NE(states_error(list_of_values(empty)).find("values in the products"), std::string::npos);
 }
 
 }  // namespace
