@@ -227,9 +227,15 @@ class BlockLooks::Maker {
     const StateTint* const by_state = state_tint_of(name_);
     const Rgba8 tint = tint_of(type_, name_);
     const bool has_others = states.cases.size() > 1;
+    std::size_t condition_count = 0;
     for (const StateCase& each : states.cases) {
       auto when = states_.conditions(each);
       if (!when) return when.error();
+      condition_count += when->size();
+      if (condition_count > kMaxTypeConditions) {
+        return make_error(ErrorCode::LimitExceeded,
+                          "more than " + std::to_string(kMaxTypeConditions) + " conditions of a block");
+      }
       if (when->empty()) continue;
       // A variant without properties stands for all states that have no other.
       if (!states.is_multipart && has_others && is_always(*when) && !outcomes_.empty()) continue;

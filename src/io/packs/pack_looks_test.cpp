@@ -398,6 +398,20 @@ TEST(PackLooks, OwnPackFillsModelsThatTheGameDraws) {
   EXPECT_EQ(looks.report().without_look, 0U);
 }
 
+TEST(PackLooks, LimitsTheConditionsOfAType) {
+  // Each case has 31 * 31 conditions.
+  std::string cases;
+  for (int i = 0; i < 16; ++i) {
+    cases += (i == 0 ? "" : ",") + (R"({"apply": {"model": "block/stone", "y": )" + std::to_string(i % 4 * 90)) +
+             R"(}, "when": {"a": "!0", "b": "!0"}})";
+  }
+  PackBuilder pack = small_pack();
+  pack.states("thing", R"({"multipart": [)" + cases + "]}");
+  const BlockPackReport report = report_of(pack, block("minecraft:thing", {{"a", "1"}, {"b", "2"}}).type);
+  ASSERT_EQ(report.without_look, 1U);
+  EXPECT_NE(report.names.at(0).find("conditions of a block"), std::string::npos) << report.names[0];
+}
+
 TEST(PackLooks, OwnPackKeepsFluidsOfEarlierConversions) {
   PackBuilder red = small_pack();
   red.texture("block/water_still", packs_test::plain_png(kRed));
