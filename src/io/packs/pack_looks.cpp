@@ -302,7 +302,8 @@ class BlockLooks::Maker {
   const PackTexture* texture_named(const ResourceName& name) {
     const auto found = looks_.textures_.texture(name);
     if (found && *found != nullptr) return *found;
-    if (!is_own_ && looks_.missing_.insert(to_string(name)).second) {
+    // The own pack need not have every texture, but a damaged one is always a file of another pack.
+    if ((!is_own_ || !found) && looks_.missing_.insert(to_string(name)).second) {
       ++looks_.report_.missing_textures;
       looks_.note(to_string(name), found ? "no such texture" : to_string(found.error()));
     }

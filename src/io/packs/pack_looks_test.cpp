@@ -412,6 +412,17 @@ TEST(PackLooks, LimitsTheConditionsOfAType) {
   EXPECT_NE(report.names.at(0).find("conditions of a block"), std::string::npos) << report.names[0];
 }
 
+TEST(PackLooks, ReportsDamagedTexturesOnModelsOfTheOwnPack) {
+  PackBuilder pack;
+  pack.texture("block/red", "no image");
+  BlockLooks looks(pack.files(), small_pack().files());
+  EXPECT_FALSE(looks.applied(block("minecraft:stone").type) == block("minecraft:stone").type);
+  const BlockPackReport report = looks.report();
+  EXPECT_EQ(report.without_look, 0U);
+  EXPECT_EQ(report.missing_textures, 1U);
+  EXPECT_NE(to_string(report).find("block/red"), std::string::npos) << to_string(report);
+}
+
 TEST(PackLooks, OwnPackKeepsFluidsOfEarlierConversions) {
   PackBuilder red = small_pack();
   red.texture("block/water_still", packs_test::plain_png(kRed));
