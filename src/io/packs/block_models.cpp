@@ -19,7 +19,10 @@ using Json = nlohmann::json;
 
 constexpr int kMaxJsonDepth = 64;
 constexpr int kMaxReferences = 32;
-constexpr float kMaxPart = 1'024.0F;  // of textures, in sixteenths: the limit of shapes
+// Models inherit the textures of their parents, so each one keeps a copy.
+constexpr std::size_t kMaxModelTextures = 1'024;
+constexpr std::size_t kMaxTextureText = 600;  // a namespace and a path of at most 512 bytes, or a reference
+constexpr float kMaxPart = 1'024.0F;          // of textures, in sixteenths: the limit of shapes
 
 /// An error of a file, made where the fault is found; callers add the file.
 Error wrong_model(const std::string& reason) {
@@ -92,6 +95,7 @@ Result<PackFace> face_of(const Json& json) {
   if (!json.is_object()) return wrong_model("a face is not an object");
   PackFace face;
   face.texture = text_in(json, "texture");
+  if (face.texture.size() > kMaxTextureText) return wrong_model("the texture of a face has a name that is too long");
   if (const auto uv = json.find("uv"); uv != json.end()) {
     std::array<float, 4> part{};
     if (!read_numbers(*uv, -kMaxPart, kMaxPart, part)) return wrong_model("\"uv\" is not four numbers");
@@ -146,7 +150,14 @@ Status read_model(const Json& json, BlockModel& model) {
       const std::string text = value.is_object()   ? text_in(value, "sprite")
                                : value.is_string() ? value.get<std::string>()
                                                    : "";
+      if (key.size() > kMaxTextureText || text.size() > kMaxTextureText) {
+        return wrong_model("a texture has a name that is too long");
+      }
       model.textures.insert_or_assign(key, text);
+      if (model.textures.size() > kMaxModelTextures) {
+        return make_error(ErrorCode::LimitExceeded,
+                          "the model has more than " + std::to_string(kMaxModelTextures) + " textures");
+      }
     }
   }
   const auto elements = json.find("elements");

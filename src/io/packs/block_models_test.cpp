@@ -115,6 +115,20 @@ TEST(BlockModels, RefusesWrongElements) {
   EXPECT_NE(error_of_element(many).find("513 elements"), std::string::npos);
 }
 
+TEST(BlockModels, LimitsTextures) {
+  PackBuilder pack;
+  pack.model("block/long", R"({"textures": {"a": ")" + std::string(100'000, 'a') + "\"}}");
+  std::string many;
+  for (int i = 0; i < 1'500; ++i) many += (i == 0 ? "\"t" : ",\"t") + std::to_string(i) + R"(": "block/a")";
+  pack.model("block/many", R"({"textures": {)" + many + "}}");
+  EXPECT_NE(model_error(pack, "block/long").find("too long"), std::string::npos);
+  EXPECT_NE(model_error(pack, "block/many").find("more than 1024 textures"), std::string::npos);
+  EXPECT_NE(error_of_element(R"({"from": [0, 0, 0], "to": [16, 16, 16], "faces": {"up": {"texture": ")" +
+                             std::string(100'000, 'a') + "\"}}}")
+                .find("too long"),
+            std::string::npos);
+}
+
 TEST(BlockModels, RefusesDeepAndLargeJson) {
   PackBuilder pack;
   pack.model("block/deep", R"({"a": )" + std::string(100'000, '[') + std::string(100'000, ']') + "}");
