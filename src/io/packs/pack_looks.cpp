@@ -258,7 +258,7 @@ class BlockLooks::Maker {
   void note_model(const std::string& name, const std::string& reason) {
     if (is_own_ || !looks_.missing_.insert("model " + name).second) return;
     ++looks_.report_.missing_models;
-    looks_.note("model " + printable(name), reason);
+    looks_.note("model " + name, reason);
   }
 
   static bool has_tinted_face(const BlockModel& model) {
@@ -587,7 +587,7 @@ BlockLooks::BlockLooks(std::shared_ptr<const PackFiles> packs, std::shared_ptr<c
 
 void BlockLooks::note(std::string name, const std::string& reason) {
   if (report_.names.size() < kMaxNames)
-    report_.names.push_back(std::move(name.append(" (").append(reason).append(")")));
+    report_.names.push_back(printable(name.append(" (").append(reason).append(")")));
 }
 
 VoxelProperties BlockLooks::applied(const VoxelProperties& type) {

@@ -423,6 +423,11 @@ TEST(PackLooks, ReportsDamagedTexturesOnModelsOfTheOwnPack) {
   EXPECT_NE(to_string(report).find("block/red"), std::string::npos) << to_string(report);
 }
 
+TEST(PackLooks, ReportsNamesOnOneLine) {
+  const BlockPackReport report = report_of(small_pack(), block("mod:a\x1B[2J\nb").type);
+  EXPECT_EQ(report.names.at(0), "mod:a [2J b (not in the packs)");
+}
+
 TEST(PackLooks, OwnPackKeepsFluidsOfEarlierConversions) {
   PackBuilder red = small_pack();
   red.texture("block/water_still", packs_test::plain_png(kRed));
