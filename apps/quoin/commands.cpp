@@ -1,5 +1,6 @@
 #include "commands.h"
 
+#include <algorithm>
 #include <bit>
 #include <charconv>
 #include <cmath>

@@ -5,8 +5,9 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
-#include <vector>
+#include <string_view>
 
 #include <quoin/core/image.h>
 #include <quoin/core/result.h>
