@@ -20,8 +20,9 @@ inline constexpr const char* kBuiltinPack = "builtin";
 
 /// The counts of BlockPacks::apply, over all calls.
 struct BlockPackReport {
-  std::size_t types = 0;             ///< Minecraft blocks
-  std::size_t without_look = 0;      ///< of them, blocks without a usable block state or model, which stay as they are
+  std::size_t types = 0;           ///< Minecraft blocks
+  std::size_t without_look = 0;    ///< of them, blocks without a usable block state or model, which stay as they are
+  std::size_t replaced_looks = 0;  ///< blocks with the look of kBuiltinPack, since that of another pack cannot be used
   std::size_t missing_textures = 0;  ///< distinct textures that the packs lack or that cannot be read
   std::size_t missing_models = 0;    ///< distinct models, of the same kind
   std::vector<std::string> names{};  ///< the first 8 of these blocks, textures and models, with the reason

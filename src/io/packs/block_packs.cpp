@@ -59,11 +59,12 @@ std::string to_string(const BlockPackReport& report) {
     add(counted(report.without_look, "block type", "block types") + " of " +
         with_thousands(static_cast<std::int64_t>(report.types)) + " without a look");
   }
+  if (report.replaced_looks > 0) add(counted(report.replaced_looks, "look", "looks") + " replaced by the own pack");
   if (report.missing_textures > 0) add(counted(report.missing_textures, "texture", "textures") + " missing");
   if (report.missing_models > 0) add(counted(report.missing_models, "model", "models") + " missing");
   std::string names;
   for (const std::string& name : report.names) names += (names.empty() ? ": " : ", ") + name;
-  const std::size_t all = report.without_look + report.missing_textures + report.missing_models;
+  const std::size_t all = report.without_look + report.replaced_looks + report.missing_textures + report.missing_models;
   return text + names + (report.names.size() < all ? ", ..." : "");
 }
 

@@ -580,9 +580,9 @@ BlockLooks::BlockLooks(std::shared_ptr<const PackFiles> packs, std::shared_ptr<c
       own_(std::move(own)),
       all_(own_ == nullptr ? packs_
                            : std::make_shared<PackStack>(std::vector<std::shared_ptr<const PackFiles>>{own_, packs_})),
-      library_(*packs_),
+      library_(*packs_, *all_),
       textures_(*all_) {
-  if (own_ != nullptr) own_library_.emplace(*own_);
+  if (own_ != nullptr) own_library_.emplace(*own_, *own_);
 }
 
 void BlockLooks::note(std::string name, const std::string& reason) {
@@ -595,18 +595,30 @@ VoxelProperties BlockLooks::applied(const VoxelProperties& type) {
   const std::scoped_lock lock(mutex_);
   ++report_.types;
   std::string reason = "not in the packs";
+  bool is_damaged = false;  // the look of a named pack
   for (PackLibrary* const library : {&library_, own_library_ ? &*own_library_ : nullptr}) {
     if (library == nullptr) continue;
     // A world that was converted with a pack keeps its looks.
     if (library != &library_ && (!type.faces.empty() || !type.shapes.empty())) return type;
+    const std::size_t refused = textures_.refused_blends();
     auto made = Maker(*this, *library, type).make();
     if (!made) {
       reason = to_string(made.error());
+      is_damaged = true;
+    } else if (textures_.refused_blends() > refused) {
+      reason = "the blended textures of faces on equal faces have more than 2^26 texels";
+      is_damaged = true;
     } else if (*made) {
-      if (Status valid = validate_type(**made))
-        return std::move(**made);
-      else
+      if (Status valid = validate_type(**made); !valid) {
         reason = valid.error().message;
+        is_damaged = true;
+        continue;
+      }
+      if (is_damaged) {
+        ++report_.replaced_looks;
+        note(type.name, reason);
+      }
+      return std::move(**made);
     }
   }
   ++report_.without_look;

@@ -20,9 +20,10 @@
 
 namespace quoin::packs {
 
-/// The block states and models of one pack. Textures may come from another.
+/// The block states of one pack, and models of `models_of`, which may have more: models of a mod inherit from those of
+/// the game.
 struct PackLibrary {
-  explicit PackLibrary(const PackFiles& files) : pack(files), models(files) {}
+  PackLibrary(const PackFiles& states_of, const PackFiles& models_of) : pack(states_of), models(models_of) {}
 
   const PackFiles& pack;
   ModelReader models;

@@ -1,4 +1,5 @@
 #include "io/packs/pack_looks.h"
+#include "io/packs/pack_own.h"
 
 #include <array>
 #include <cstdint>
@@ -576,6 +577,50 @@ TEST(BlockPacks, AppliesToRegistries) {
   EXPECT_EQ(types[*type], stone) << "no pack has it";
   EXPECT_EQ((*packs)->report().without_look, 1U);
   EXPECT_EQ((*packs)->report().types, 1U);
+}
+
+TEST(PackLooks, ModelsOfModsInheritFromOwnPack) {
+  const auto files = std::make_shared<MemoryPack>();
+  files->put("assets/mod/blockstates/lamp.json", R"({"variants": {"": {"model": "mod:block/lamp"}}})");
+  files->put("assets/mod/models/block/lamp.json",
+             R"({"parent": "minecraft:block/cube_all", "textures": {"all": "mod:block/lamp"}})");
+  files->put("assets/mod/textures/block/lamp.png", packs_test::plain_png(kRed));
+  files->put("assets/minecraft/blockstates/stone.json", "{");
+  const VoxelProperties lamp = block("mod:lamp").type;
+  EXPECT_EQ(BlockLooks(files).applied(lamp), lamp) << "no pack has the parent";
+  BlockLooks looks(files, OwnPack::instance());
+  const VoxelProperties made = looks.applied(lamp);
+  ASSERT_FALSE(made.faces.empty());
+  VoxelRegistry types;
+  const auto added = types.add(made);
+  ASSERT_TRUE(added);
+  EXPECT_EQ(types[*added].colour, kRed);
+  EXPECT_EQ(looks.report().replaced_looks, 0U);
+  // A damaged look is replaced and named. Chests have no elements in packs of the game.
+  EXPECT_FALSE(looks.applied(block("minecraft:stone").type).faces.empty());
+  EXPECT_FALSE(looks.applied(block("minecraft:chest").type).shapes.empty());
+  EXPECT_EQ(looks.report().replaced_looks, 1U);
+  EXPECT_NE(to_string(looks.report()).find("1 look replaced by the own pack: minecraft:stone"), std::string::npos)
+      << to_string(looks.report());
+}
+
+TEST(PackLooks, BlendedTexturesAreLimited) {
+  PackBuilder pack;
+  pack.texture("block/a", packs_test::plain_png(kGreen));
+  pack.texture("block/b", packs_test::plain_png(kRed));
+  TextureReader textures(*pack.files(), 16 * 16);
+  const auto layer = [&](const char* name) {
+    const auto read = textures.texture({"minecraft", std::string("block/") + name});
+    EXPECT_TRUE(read && *read);
+    return FaceLayer{.look = {.texture = (*read)->texture, .alpha = (*read)->alpha}};
+  };
+  const FaceLayer a = layer("a");
+  const FaceLayer b = layer("b");
+  EXPECT_NE(textures.blended(a, &b).look, a.look);
+  EXPECT_EQ(textures.refused_blends(), 0U);
+  EXPECT_NE(textures.blended(a, &b).look, a.look) << "made once";
+  EXPECT_EQ(textures.blended(b, &a).look, b.look);
+  EXPECT_EQ(textures.refused_blends(), 1U);
 }
 
 TEST(BlockPacks, BuiltinPackHasEveryBlock) {

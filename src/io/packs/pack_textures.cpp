@@ -222,6 +222,12 @@ FaceLayer TextureReader::blended(const FaceLayer& lower, const FaceLayer* upper)
   const auto texels = static_cast<unsigned>(std::lround(extent * static_cast<float>(lower.look.texture.size())));
   int size = std::clamp(static_cast<int>(std::bit_ceil(std::max(texels, 1U))), kMinTextureSize, kMaxTextureSize);
   if (upper != nullptr) size = std::max(lower.look.texture.size(), upper->look.texture.size());
+  const std::size_t texels_of_all = blended_texels_ + static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
+  if (texels_of_all > max_blended_texels_) {
+    ++refused_blends_;
+    return lower;
+  }
+  blended_texels_ = texels_of_all;
   AlphaImage image{size, size, {}};
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {

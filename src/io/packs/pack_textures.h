@@ -39,10 +39,14 @@ struct FaceLayer {
   std::array<float, 4> part{0.0F, 0.0F, 16.0F, 16.0F};
 };
 
+/// Maximum number of texels of blended textures: 256 MiB, without mipmaps.
+inline constexpr std::size_t kMaxBlendedTexels = std::size_t{1} << 26;
+
 /// Reads textures by name, each once. Threads: one at a time. Lifetime: the pack.
 class TextureReader {
  public:
-  explicit TextureReader(const PackFiles& pack) : pack_(pack) {}
+  explicit TextureReader(const PackFiles& pack, std::size_t max_blended_texels = kMaxBlendedTexels)
+      : pack_(pack), max_blended_texels_(max_blended_texels) {}
 
   /// Returns a texture; null if the pack does not have it. Errors: those of texture_of_png and PackFiles::read, with
   /// the file.
@@ -50,13 +54,19 @@ class TextureReader {
   /// Returns a texture of one opaque colour.
   [[nodiscard]] const PackTexture& plain(Rgba8 colour);
   /// Returns the layer that shows both: `upper` with its alpha over `lower`; or only `lower` if it is null. Its tint is
-  /// white and its texture shows a whole face, with turn 0.
+  /// white and its texture shows a whole face, with turn 0. Returns `lower` if all such textures would have more than
+  /// `max_blended_texels`; see `refused_blends`.
   [[nodiscard]] FaceLayer blended(const FaceLayer& lower, const FaceLayer* upper);
+  /// Returns the number of calls of `blended` that made no texture because of the limit.
+  [[nodiscard]] std::size_t refused_blends() const { return refused_blends_; }
 
  private:
   const PackFiles& pack_;
+  std::size_t max_blended_texels_;
   std::map<std::string, Result<std::optional<PackTexture>>> known_;
   std::map<std::string, PackTexture> made_;
+  std::size_t blended_texels_ = 0;
+  std::size_t refused_blends_ = 0;
 };
 
 }  // namespace quoin::packs
