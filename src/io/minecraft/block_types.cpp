@@ -188,6 +188,16 @@ std::string_view commonest_value(std::string_view key) {
   return words == nullptr ? std::string_view() : words->values.front();
 }
 
+std::string_view commonest_value(std::string_view key, std::span<const std::string_view> values) {
+  QUOIN_ASSERT(!values.empty(), "at least one value");
+  if (const Words* const words = words_of(key)) {
+    for (const std::string_view word : words->values) {
+      if (std::ranges::find(values, word) != values.end()) return word;
+    }
+  }
+  return values.front();
+}
+
 BlockText block_text(const VoxelProperties& type, std::uint32_t state) {
   const bool is_block = type.attributes.contains(kStatesAttribute);
   auto parsed = is_block ? parse_block(type.name) : std::nullopt;

@@ -70,6 +70,8 @@ struct StateField {
 [[nodiscard]] std::string value_of_code(const StateField& field, std::uint32_t code);
 /// Returns the commonest value of a property with words ("axis": "y"); empty for other properties.
 [[nodiscard]] std::string_view commonest_value(std::string_view key);
+/// Returns the commonest of some values of a property; the first if it is not known. Requires: there are values.
+[[nodiscard]] std::string_view commonest_value(std::string_view key, std::span<const std::string_view> values);
 
 /// "minecraft:oak_stairs[facing=east,half=top]".
 [[nodiscard]] std::string to_string(const BlockText& block);

@@ -153,6 +153,7 @@ class BlockLooks::Maker {
     const auto found = library_.states_of(states_.block());
     if (!found) return found.error();
     if (*found == nullptr) return std::optional<VoxelProperties>();
+    if (!(*found)->is_multipart) states_.choose_absent(**found);
     if (auto done = find_outcomes(**found); !done) return done.error();
     // The game draws models without elements by code.
     std::erase_if(outcomes_, [](const Outcome& each) { return each.model->elements.empty(); });

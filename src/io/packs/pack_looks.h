@@ -20,8 +20,8 @@
 
 namespace quoin::packs {
 
-/// The block states of one pack, and models of `models_of`, which may have more: models of a mod inherit from those of
-/// the game.
+/// The block states of one pack, and the models of `models_of`, which has more: models of a mod inherit from those of the
+/// game.
 struct PackLibrary {
   PackLibrary(const PackFiles& states_of, const PackFiles& models_of) : pack(states_of), models(models_of) {}
 

@@ -213,7 +213,7 @@ TEST(OwnPackOracle, DrawsCubesExactlyWhereBlocksAreCubes) {
   }
 }
 
-TEST(OwnPackOracle, EveryStateHasElements) {
+TEST(OwnPackOracle, AllStatesHaveElements) {
   if (!fs::exists(data_folder())) GTEST_SKIP() << kInstall;
   for (const std::string version : kVersions) {
     Reader reader;
@@ -241,7 +241,7 @@ TEST(OwnPackOracle, EveryStateHasElements) {
   }
 }
 
-TEST(OwnPackOracle, EveryTypeHasALook) {
+TEST(OwnPackOracle, AllTypesHaveLooks) {
   if (!fs::exists(data_folder())) GTEST_SKIP() << kInstall;
   minecraft::BlockTypes types;
   for (const Json& block : parsed(data_folder() / "blocks.json")) {
@@ -394,7 +394,7 @@ TEST(OwnPackOracle, ShapesFollowCollisionBoxesInAllStates) {
   EXPECT_EQ(problems, std::set<std::string>());
 }
 
-/// The twin of the test above: a turned door must be noticed.
+/// Checks the test above: it must notice a turned door.
 TEST(OwnPackOracle, OverlapNoticesTurns) {
   Sixteenths door(4'096);
   for (std::size_t i = 0; i < door.size(); ++i) door[i] = i % 16 < 3;

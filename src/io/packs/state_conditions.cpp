@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
 
 #include <quoin/core/assert.h>
 
@@ -63,7 +67,28 @@ bool TypeStates::has(std::string_view property) const {
          std::ranges::find(named_, property, &std::pair<std::string, std::string>::first) != named_.end();
 }
 
+void TypeStates::choose_absent(const BlockStates& variants) {
+  std::map<std::string, std::vector<std::string_view>> values;
+  std::set<std::string> met;
+  for (const StateCase& each : variants.cases) {
+    for (const std::vector<StateTerm>& terms : each.when) {
+      for (const StateTerm& term : terms) {
+        if (has(term.property)) continue;
+        if (holds_for_absent(term)) met.insert(term.property);
+        if (!term.is_negated)
+          values[term.property].insert(values[term.property].end(), term.values.begin(), term.values.end());
+      }
+    }
+  }
+  for (const auto& [property, all] : values) {
+    if (!met.contains(property) && !all.empty()) chosen_[property] = minecraft::commonest_value(property, all);
+  }
+}
+
 bool TypeStates::holds_for_absent(const StateTerm& term) const {
+  if (const auto chosen = chosen_.find(term.property); chosen != chosen_.end()) {
+    return contains_value(term, chosen->second);
+  }
   std::vector<std::string_view> common;  // it may be any of them
   if (const std::string_view word = minecraft::commonest_value(term.property); !word.empty()) common.push_back(word);
   // A side of a fence is true or false, one of a wall none, low or tall.

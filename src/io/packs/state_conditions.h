@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -34,6 +35,10 @@ class TypeStates {
   /// Returns true if the name or the state has the property.
   [[nodiscard]] bool has(std::string_view property) const;
 
+  /// Chooses a value for each property that the type does not have and whose commonest value no variant has: the
+  /// commonest one that a variant has, or the first. Call it before `conditions`, with the variants of the block.
+  void choose_absent(const BlockStates& variants);
+
   /// Returns the conditions under which a case holds: none if it never does, and one without bits if it always does.
   /// Properties that the type does not have take the value that is commonest in the game. Sides of fences, panes and
   /// the like that the type does not have become connections with neighbours (ShapeNeighbours::Connected), and the
@@ -56,6 +61,7 @@ class TypeStates {
   std::string block_;
   std::vector<std::pair<std::string, std::string>> named_;  // properties in the name
   std::vector<minecraft::StateField> fields_;
+  std::map<std::string, std::string> chosen_;  // values of absent properties
   bool connects_ = false;
   bool has_corners_ = false;
 };
