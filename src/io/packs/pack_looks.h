@@ -20,7 +20,7 @@
 
 namespace quoin::packs {
 
-/// The block states of one pack, and the models of `models_of`, which has more: models of a mod inherit from those of the
+/// The block states of one pack, and models. These can come from more packs: models of a mod inherit from those of the
 /// game.
 struct PackLibrary {
   PackLibrary(const PackFiles& states_of, const PackFiles& models_of) : pack(states_of), models(models_of) {}
