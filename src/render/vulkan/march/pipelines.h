@@ -54,7 +54,8 @@ struct PassFeatures {
 
 class Pipelines {
  public:
-  /// Makes the small pipelines of Resolve and Swap. `add` makes those that a scene needs: drivers take seconds for each.
+  /// Makes the small pipelines of Resolve and Swap. `add` makes those that a scene needs, since drivers take seconds
+  /// for each.
   [[nodiscard]] static Result<std::unique_ptr<Pipelines>> create(Device& device);
   ~Pipelines();
   /// Makes the missing pipelines of scenes with these features. `has_glass`: scenes with transparent bodies. `has_far`:
