@@ -18,6 +18,10 @@ namespace quoin {
 
 namespace {
 
+// The first four bytes of records.
+constexpr std::uint32_t kEndOfDirectory = 0x06054B50;
+constexpr std::uint32_t kOfDirectory = 0x02014B50;
+constexpr std::uint32_t kOfFile = 0x04034B50;
 constexpr std::uint64_t kMost = 0xFFFF'FFFF;
 constexpr std::size_t kLocalHeader = 30;
 // Offset in the local header of the checksum and both sizes, which are known only at the end.
@@ -78,7 +82,7 @@ void ZipFile::begin(std::string name) {
   Entry entry;
   entry.name = std::move(name);
   entry.at = bytes_.size();
-  put_number(bytes_, 0x0403'4B50, 4);
+  put_number(bytes_, kOfFile, 4);
   put_number(bytes_, 20, 2);  // needs version 2.0
   put_number(bytes_, 0, 2);
   put_number(bytes_, Z_DEFLATED, 2);
@@ -123,7 +127,7 @@ Result<std::vector<std::byte>> ZipFile::take() {
   for (const Entry& entry : entries_) {
     if (entry.size > kMost || directory > kMost)
       return make_error(ErrorCode::LimitExceeded, "the zip file would have 4 GiB or more");
-    put_number(bytes_, 0x0201'4B50, 4);
+    put_number(bytes_, kOfDirectory, 4);
     put_number(bytes_, 20, 2);  // made by version 2.0
     put_number(bytes_, 20, 2);
     put_number(bytes_, 0, 2);
@@ -139,7 +143,7 @@ Result<std::vector<std::byte>> ZipFile::take() {
     put_text(bytes_, entry.name);
   }
   const std::uint64_t size = bytes_.size() - directory;
-  put_number(bytes_, 0x0605'4B50, 4);
+  put_number(bytes_, kEndOfDirectory, 4);
   put_number(bytes_, 0, 4);
   put_number(bytes_, entries_.size(), 2);
   put_number(bytes_, entries_.size(), 2);
@@ -151,9 +155,6 @@ Result<std::vector<std::byte>> ZipFile::take() {
 
 namespace {
 
-constexpr std::uint32_t kEndOfDirectory = 0x06054B50;
-constexpr std::uint32_t kOfDirectory = 0x02014B50;
-constexpr std::uint32_t kOfFile = 0x04034B50;
 constexpr std::uint32_t kEndOfDirectory64 = 0x06064B50;
 constexpr std::uint32_t kLocator64 = 0x07064B50;
 constexpr std::size_t kEndBytes = 22;

@@ -519,11 +519,6 @@ bool is_thin(std::string_view shape) {
 constexpr std::string_view kPrefixesWithoutLook[] = {"waxed_",  "infested_", "potted_",   "dead_",     "stripped_",
                                                      "smooth_", "cut_",      "chiseled_", "polished_", "cracked_"};
 
-Rgba8 rgb(std::uint32_t hex, std::uint8_t alpha = 255) {
-  return {static_cast<std::uint8_t>(hex >> 16), static_cast<std::uint8_t>(hex >> 8), static_cast<std::uint8_t>(hex),
-          alpha};
-}
-
 BlockLook look_of(std::uint32_t hex, Kind kind) {
   constexpr std::uint8_t kPlantAlpha = 90;
   constexpr std::uint8_t kThinAlpha = 110;
@@ -531,7 +526,7 @@ BlockLook look_of(std::uint32_t hex, Kind kind) {
   constexpr std::uint8_t kWaterAlpha = 150;
   constexpr std::uint8_t kIceAlpha = 190;
   BlockLook look;
-  look.colour = rgb(hex);
+  look.colour = colour_of_rgb(hex);
   switch (kind) {
     case Kind::Air:
     case Kind::Invisible:
@@ -817,7 +812,7 @@ std::optional<BlockLook> look_by_words(std::string_view name) {
   }
   for (const Dye& dye : kDyes) {
     if (!has_word(name, dye.name)) continue;
-    const Rgba8 colour = rgb(dye.cloth);
+    const Rgba8 colour = colour_of_rgb(dye.cloth);
     if (!look) return look_of(dye.cloth, Kind::Solid);
     if (look->tint == Tint::None && !look->is_air) {
       look->colour = {colour.r, colour.g, colour.b, look->colour.a};
@@ -891,7 +886,7 @@ BlockLook look_of_block(std::string_view name, bool is_lit, bool is_snowy) {
   set_passage(name, look);
   if (is_lit && is_lamp(name)) look.emission = 1.0F;
   if (is_snowy) {
-    look.colour = rgb(0xF2F7F7);
+    look.colour = colour_of_rgb(0xF2F7F7);
     look.tint = Tint::None;
   }
   return look;

@@ -33,6 +33,11 @@ struct BiomeTints {
 /// The biome colour that a block's colour is multiplied by.
 enum class Tint : std::uint8_t { None, Grass, Foliage, Water };
 
+/// Returns the colour 0xRRGGBB.
+[[nodiscard]] constexpr Rgba8 colour_of_rgb(std::uint32_t rgb, std::uint8_t alpha = 255) {
+  return {static_cast<std::uint8_t>(rgb >> 16), static_cast<std::uint8_t>(rgb >> 8), static_cast<std::uint8_t>(rgb),
+          alpha};
+}
 /// Returns a biome's colour of a tint, 0xRRGGBB; white for Tint::None.
 [[nodiscard]] std::uint32_t colour_of(Tint tint, const BiomeTints& biome);
 /// Returns a colour multiplied by the tint; alpha is unchanged.

@@ -22,16 +22,6 @@ constexpr std::size_t kMaxStates = 512;
 constexpr int kMaxAliases = 4;
 constexpr std::string_view kDirectionNames[] = {"north", "east", "south", "west"};
 
-std::vector<std::string> words(std::string_view text, char between = ' ') {
-  std::vector<std::string> found;
-  while (!text.empty()) {
-    const std::size_t end = std::min(text.find(between), text.size());
-    if (end > 0) found.emplace_back(text.substr(0, end));
-    text.remove_prefix(std::min(end + 1, text.size()));
-  }
-  return found;
-}
-
 /// Splits at the first separator; the second part is empty if there is none.
 std::pair<std::string, std::string> split(std::string_view text, char between) {
   const std::size_t at = text.find(between);
@@ -52,6 +42,24 @@ std::optional<std::array<float, kCount>> family_numbers(std::string_view text, f
   return numbers;
 }
 
+/// Puts the texts that a pattern's stars stand for, and the name, into a text.
+std::string filled(std::string text, const PackName& block, const std::vector<std::string>& stars) {
+  text = with_stars(std::move(text), stars);
+  return replaced(replaced(std::move(text), "{name}", block.name), "{space}", block.space);
+}
+
+}  // namespace
+
+std::vector<std::string> words(std::string_view text, char between) {
+  std::vector<std::string> found;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find(between), text.size());
+    if (end > 0) found.emplace_back(text.substr(0, end));
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return found;
+}
+
 std::string replaced(std::string text, std::string_view old, std::string_view by) {
   for (std::size_t at = text.find(old); at != std::string::npos; at = text.find(old, at + by.size())) {
     text.replace(at, old.size(), by);
@@ -59,15 +67,12 @@ std::string replaced(std::string text, std::string_view old, std::string_view by
   return text;
 }
 
-/// Puts the texts that a pattern's stars stand for, and the name, into a text.
-std::string filled(std::string text, const PackName& block, const std::vector<std::string>& stars) {
+std::string with_stars(std::string text, const std::vector<std::string>& stars) {
   for (std::size_t i = 0; i < stars.size(); ++i) {
     text = replaced(std::move(text), "{" + std::to_string(i + 1) + "}", stars[i]);
   }
-  return replaced(replaced(std::move(text), "{name}", block.name), "{space}", block.space);
+  return text;
 }
-
-}  // namespace
 
 PackName pack_name(std::string_view text) {
   const std::size_t colon = text.find(':');

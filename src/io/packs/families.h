@@ -28,6 +28,13 @@ struct PackName {
 /// Splits "minecraft:oak_stairs"; names without a namespace are Minecraft's.
 [[nodiscard]] PackName pack_name(std::string_view text);
 
+/// Returns the parts of a text that are not empty.
+[[nodiscard]] std::vector<std::string> words(std::string_view text, char between = ' ');
+/// Returns the text with `by` at each place of `old`.
+[[nodiscard]] std::string replaced(std::string text, std::string_view old, std::string_view by);
+/// Returns the text with the texts of stars (`match_name`) for "{1}" and "{2}".
+[[nodiscard]] std::string with_stars(std::string text, const std::vector<std::string>& stars);
+
 /// Returns the texts that the stars of a pattern stand for, in order; nullopt if the pattern does not match. Stars
 /// match at least one character, as few as possible. A pattern has at most two stars.
 [[nodiscard]] std::optional<std::vector<std::string>> match_name(std::string_view pattern, std::string_view name);

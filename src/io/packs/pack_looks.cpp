@@ -25,10 +25,6 @@ namespace {
 constexpr Rgba8 kWhite{255, 255, 255};
 constexpr std::size_t kMaxNames = 8;  // of a report
 
-Rgba8 colour_of_number(std::uint32_t rgb) {
-  return {static_cast<std::uint8_t>(rgb >> 16), static_cast<std::uint8_t>(rgb >> 8), static_cast<std::uint8_t>(rgb)};
-}
-
 std::string_view without_space(std::string_view block) {
   const std::size_t colon = block.find(':');
   return colon == std::string_view::npos ? block : block.substr(colon + 1);
@@ -45,17 +41,17 @@ Rgba8 tint_of(const VoxelProperties& type, std::string_view name) {
     std::uint32_t rgb = 0;
     const std::string& digits = found->second;
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), rgb, 16);
-    if (error == std::errc() && end == digits.data() + digits.size()) return colour_of_number(rgb);
+    if (error == std::errc() && end == digits.data() + digits.size()) return minecraft::colour_of_rgb(rgb);
   }
   constexpr minecraft::BiomeTints kPlains{};
-  if (name == "spruce_leaves") return colour_of_number(0x619961);
-  if (name == "birch_leaves") return colour_of_number(0x80A755);
-  if (name == "lily_pad") return colour_of_number(0x208030);
-  if (name.starts_with("attached_") && name.ends_with("_stem")) return colour_of_number(0xE0C71C);
-  if (has_any(name, {"water", "bubble_column"})) return colour_of_number(kPlains.water);
-  if (has_any(name, {"leaves", "vine"})) return colour_of_number(kPlains.foliage);
+  if (name == "spruce_leaves") return minecraft::colour_of_rgb(0x619961);
+  if (name == "birch_leaves") return minecraft::colour_of_rgb(0x80A755);
+  if (name == "lily_pad") return minecraft::colour_of_rgb(0x208030);
+  if (name.starts_with("attached_") && name.ends_with("_stem")) return minecraft::colour_of_rgb(0xE0C71C);
+  if (has_any(name, {"water", "bubble_column"})) return minecraft::colour_of_rgb(kPlains.water);
+  if (has_any(name, {"leaves", "vine"})) return minecraft::colour_of_rgb(kPlains.foliage);
   if (has_any(name, {"grass", "fern", "sugar_cane", "petals", "wildflowers", "bush"})) {
-    return colour_of_number(kPlains.grass);
+    return minecraft::colour_of_rgb(kPlains.grass);
   }
   return kWhite;
 }

@@ -41,10 +41,6 @@ std::optional<std::uint32_t> parse_colour(std::string_view text) {
   return rgb;
 }
 
-Rgba8 colour_of_rgb(std::uint32_t rgb) {
-  return {static_cast<std::uint8_t>(rgb >> 16), static_cast<std::uint8_t>(rgb >> 8), static_cast<std::uint8_t>(rgb)};
-}
-
 /// Returns the colour of a block; `name` may be a texture's, such as "furnace_side".
 Rgba8 colour_of_block(const PackName& block) {
   constexpr std::array<std::string_view, 8> kEnds = {"_top",  "_side", "_front", "_bottom",
@@ -99,23 +95,6 @@ void add_layer(const Pattern& pattern, Vec3 colour, float opacity, std::array<Ve
   }
 }
 
-std::string put(std::string text, const std::string& old, const std::string& by) {
-  for (std::size_t at = text.find(old); at != std::string::npos; at = text.find(old, at + by.size())) {
-    text.replace(at, old.size(), by);
-  }
-  return text;
-}
-
-std::vector<std::string> texts_between_blanks(const std::string& text) {
-  std::vector<std::string> parts;
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t end = std::min(text.find(' ', at), text.size());
-    if (end > at) parts.push_back(text.substr(at, end - at));
-    at = end + 1;
-  }
-  return parts;
-}
-
 /// Splits "assets/SPACE/FOLDER/NAME.END" into SPACE and NAME.
 std::optional<PackName> name_in(std::string_view path, std::string_view folder, std::string_view end) {
   constexpr std::string_view kTop = "assets/";
@@ -152,7 +131,7 @@ Result<TextureRecipes> TextureRecipes::from_text(std::string_view table) {
       if (!row[i].is_string()) return fault("must be texts");
       if (i == 0) continue;
       const auto text = row[i].get<std::string>();
-      const std::vector<std::string> parts = texts_between_blanks(text);
+      const std::vector<std::string> parts = words(text);
       if (parts.size() < 2 || parts.size() > 4) return fault("a layer is a pattern, a colour and factors: " + text);
       if (!has_pattern(parts[0])) return fault("no pattern " + parts[0]);
       if (parts[1][0] == '#' && !parse_colour(parts[1])) return fault("invalid colour " + parts[1]);
@@ -165,7 +144,7 @@ Result<TextureRecipes> TextureRecipes::from_text(std::string_view table) {
       }
       layers.push_back(std::move(layer));
     }
-    for (const std::string& name : texts_between_blanks(row[0].get<std::string>())) {
+    for (const std::string& name : words(row[0].get<std::string>())) {
       NamePatterns& names = name.find('/') == std::string::npos ? made.names_ : made.names_in_folders_;
       if (auto status = names.add(name, made.rows_.size()); !status) return fault(status.error().message);
     }
@@ -193,12 +172,9 @@ std::optional<AlphaImage> TextureRecipes::draw(const PackName& texture) const {
   for (const Layer& layer : rows_[match->row]) {
     Rgba8 colour{};
     if (const auto fixed = parse_colour(layer.colour)) {
-      colour = colour_of_rgb(*fixed);
+      colour = minecraft::colour_of_rgb(*fixed);
     } else {
-      std::string block = put(layer.colour, "self", name.name);
-      for (std::size_t i = 0; i < match->stars.size(); ++i) {
-        block = put(std::move(block), "{" + std::to_string(i + 1) + "}", match->stars[i]);
-      }
+      std::string block = with_stars(replaced(layer.colour, "self", name.name), match->stars);
       colour = colour_of_block({name.space, std::move(block)});
     }
     add_layer(*draw_pattern(layer.pattern), linear_colour(colour) * layer.brightness, layer.alpha, image, alpha);
