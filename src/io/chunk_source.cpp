@@ -188,7 +188,7 @@ bool meet(const IBox& a, const IBox& b) {
   return !intersect(a, b).empty();
 }
 
-std::string text_of(const IBox& chunks) {
+std::string middle_of(const IBox& chunks) {
   const IVec3 middle = (chunks.min + (chunks.size() - 1) / 2) * kChunkEdge;
   return std::to_string(middle.x) + ", " + std::to_string(middle.z);
 }
@@ -205,7 +205,7 @@ void warn_of_outside(const ChunkSource& source, const IBox& chunks, std::size_t 
   const bool is_at_spawn = spawn && is_over(chunks, chunk_of(voxel_of(*spawn)));
   const std::string why = spawn ? "the spawn has no chunks around it" : "the world has no spawn";
   const std::string where = is_at_spawn ? "only chunks around the spawn are read: "
-                                        : why + "; only the chunks around (" + text_of(chunks) + ") are read: ";
+                                        : why + "; only the chunks around (" + middle_of(chunks) + ") are read: ";
   warnings.push_back(where + std::to_string(read) + " of " + std::to_string(all) +
                      " parts of the world (convert it to .quoin for all)");
 }

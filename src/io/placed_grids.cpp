@@ -22,7 +22,7 @@ namespace {
 constexpr double kRounding = 1e-6;
 constexpr double kFarthest = 1 << 26;
 
-std::string text_of(const Instance& instance, const SceneGrid& grid) {
+std::string name_of(const Instance& instance, const SceneGrid& grid) {
   std::string text = "the instance \"";
   return text.append(printable(instance.name.empty() ? grid.name : instance.name)).append("\"");
 }
@@ -173,7 +173,7 @@ class Placer {
     if (is_first_) voxel_size_ = instance.voxel_size;
     is_first_ = false;
     if (std::abs(instance.voxel_size - voxel_size_) > kRounding * voxel_size_) {
-      return make_error(ErrorCode::Unsupported, text_of(instance, *grid) +
+      return make_error(ErrorCode::Unsupported, name_of(instance, *grid) +
                                                     " has a different voxel size than others, which " +
                                                     std::string(holds_.extension) + " cannot store");
     }
@@ -183,7 +183,7 @@ class Placer {
   Status turn(const Instance& instance, const SceneGrid& grid, const IBox& box, bool visible) {
     const auto orientation = AxisOrientation::near_matrix(world_axes(instance), kRounding);
     if (!orientation) {
-      return make_error(ErrorCode::Unsupported, text_of(instance, grid) +
+      return make_error(ErrorCode::Unsupported, name_of(instance, grid) +
                                                     " is not rotated by multiples of 90 degrees, as " +
                                                     std::string(holds_.extension) + " requires");
     }
@@ -197,7 +197,7 @@ class Placer {
     const double reach = std::max({std::abs(nearest.x), std::abs(nearest.y), std::abs(nearest.z)}) +
                          static_cast<double>(std::max({size.x, size.y, size.z}));
     if (!(reach < kFarthest)) {
-      return make_error(ErrorCode::LimitExceeded, text_of(instance, grid) + " is too far from the origin");
+      return make_error(ErrorCode::LimitExceeded, name_of(instance, grid) + " is too far from the origin");
     }
     const DVec3 off = glm::abs(nearest - least);
     if (std::max({off.x, off.y, off.z}) > kNearestVoxel) ++losses_.rounded;
@@ -209,7 +209,7 @@ class Placer {
     CopyOptions turned;
     turned.types = &scene_.types;
     copy_box(grid.grid, box, placed.voxels, min, *orientation, turned);
-    if (auto known = check_types(placed.voxels, scene_.types, text_of(instance, grid)); !known) return known;
+    if (auto known = check_types(placed.voxels, scene_.types, name_of(instance, grid)); !known) return known;
     if (!placed.name.empty()) ++losses_.nameless;
     losses_.count(placed, *orientation != AxisOrientation());
     take_(std::move(placed));

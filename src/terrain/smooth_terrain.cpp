@@ -267,19 +267,19 @@ DensityChunk SmoothColumn::make(const TerrainTypes& types, int chunk_y) {
 namespace quoin {
 namespace {
 
-constexpr int kMaxAcross = 512;
-constexpr int kMaxUp = 16;
-constexpr int kMaxPlace = 1 << 19;
 constexpr int kUnitsPerChunk = kChunkEdge / kTerrainUnit;
 constexpr float kBand = 8.0F;
 
 // Returns true if all types of a smooth world are set, as by add_terrain_types.
-[[maybe_unused]] bool are_filled(const TerrainTypes& t) {
+[[maybe_unused]] bool are_smooth_filled(const TerrainTypes& t) {
   const VoxelType all[] = {t.grass, t.earth, t.stone, t.sand, t.snow};
   return std::find(std::begin(all), std::end(all), kAir) == std::end(all);
 }
 
 Status check(const SmoothTerrainOptions& options) {
+  constexpr int kMaxAcross = 512;
+  constexpr int kMaxUp = 16;
+  constexpr int kMaxPlace = 1 << 19;
   const IVec3 size = options.size;
   if (std::min({size.x, size.y, size.z}) < 1 || size.y > kMaxUp || std::max(size.x, size.z) > kMaxAcross) {
     return make_error(ErrorCode::InvalidArgument,
@@ -314,7 +314,7 @@ IBox samples_of(const IBox& chunks) {
 DensityChunk generate_smooth_terrain_chunk(const SmoothTerrainOptions& options, const TerrainTypes& types,
                                            IVec3 chunk) {
   QUOIN_ASSERT(check(options).has_value(), "sizes and origins within their ranges");
-  QUOIN_ASSERT(are_filled(types), "types that add_terrain_types filled");
+  QUOIN_ASSERT(are_smooth_filled(types), "types that add_terrain_types filled");
   const IBox chunks = chunks_of(options);
   if (!chunks.contains(chunk)) return DensityChunk(stored_density(kBand, kBand));
   const terrain::Landform land = landform_of(options);
@@ -324,7 +324,7 @@ DensityChunk generate_smooth_terrain_chunk(const SmoothTerrainOptions& options, 
 Result<DensityGrid> generate_smooth_terrain(const SmoothTerrainOptions& options, const TerrainTypes& types,
                                             Threads threads, const Progress& progress) {
   if (auto sound = check(options); !sound) return sound.error();
-  QUOIN_ASSERT(are_filled(types), "types that add_terrain_types filled");
+  QUOIN_ASSERT(are_smooth_filled(types), "types that add_terrain_types filled");
   const terrain::Landform land = landform_of(options);
   const IBox chunks = chunks_of(options);
   const auto across = static_cast<std::size_t>(options.size.x);

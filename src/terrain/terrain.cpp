@@ -463,11 +463,10 @@ Chunk make_ground(const Landform& land, const std::vector<Column>& columns, cons
 namespace quoin {
 namespace {
 
-constexpr int kMaxAcross = 1'024;
-constexpr int kMaxUp = 32;
-constexpr int kMaxPlace = 1 << 20;
-
 Status check(const TerrainOptions& options) {
+  constexpr int kMaxAcross = 1'024;
+  constexpr int kMaxUp = 32;
+  constexpr int kMaxPlace = 1 << 20;
   const IVec3 size = options.size;
   if (std::min({size.x, size.y, size.z}) < 1 || size.y > kMaxUp || std::max(size.x, size.z) > kMaxAcross) {
     return make_error(ErrorCode::InvalidArgument,

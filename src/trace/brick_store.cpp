@@ -7,7 +7,6 @@
 namespace quoin::trace {
 namespace {
 
-constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr unsigned kLineWords = 8;
 
 // Returns the place of a slab's first word.

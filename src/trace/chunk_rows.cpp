@@ -11,8 +11,6 @@
 namespace quoin::trace {
 namespace {
 
-constexpr std::uint64_t kAll = ~std::uint64_t{0};
-
 bool counts(const VoxelRegistry& types, VoxelType type, Occupancy which) {
   if (type == kAir) return false;
   if (which == Occupancy::NonAir) return true;

@@ -201,7 +201,6 @@ bool BrickRow::read(const Rows& rows, int y, int z, RowsBox& box) {
 /// `wanted` brick. Returns the full bricks.
 template <class Rows>
 std::uint64_t add_uniform(const Rows& rows, std::uint64_t wanted, UniformBlocks& blocks) {
-  constexpr std::uint64_t kAll = ~std::uint64_t{0};
   std::uint64_t bricks = 0;
   RowsBox unused;
   BrickRow four;

@@ -54,7 +54,6 @@ std::size_t place_in(IVec3 strides, IVec3 unit) {
          static_cast<std::size_t>(unit.z) * static_cast<std::size_t>(strides.z);
 }
 
-constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr int kRegionShift = 4;  // chunks, per axis
 // If more slabs than this of a row of four bricks change, fill_row assembles each brick once.
 constexpr int kFewSlabs = 2;
@@ -248,7 +247,7 @@ struct OccupancyTree::Impl {
   void replace_brick(ChunkNode& node, std::size_t brick, const Node& words, std::uint64_t cells) {
     QUOIN_ASSERT(brick < node.bricks.size(), "one of the node's 64 bricks");
     const bool is_full =
-        cells == kAll && std::all_of(words.begin(), words.end(), [](auto word) { return word == kAll; });
+        cells == trace::kAll && std::all_of(words.begin(), words.end(), [](auto word) { return word == trace::kAll; });
     if (cells == 0 || is_full) {
       set_uniform(node, brick, is_full);
       return;
@@ -264,7 +263,7 @@ struct OccupancyTree::Impl {
     if (code == wanted) return false;
     bricks.release(code);
     code = wanted;
-    node.cells[brick] = is_full ? kAll : 0;
+    node.cells[brick] = is_full ? trace::kAll : 0;
     return true;
   }
 
@@ -283,7 +282,7 @@ struct OccupancyTree::Impl {
     if (bricks.words(code).has_four(4 * slab, words.data())) return false;
     code = bricks.put_slab(code, slab, words);
     const std::uint64_t cells = node.cells[brick] = with_slab(node.cells[brick], slab, words);
-    const bool is_full = cells == kAll && bricks.is_full(code);
+    const bool is_full = cells == trace::kAll && bricks.is_full(code);
     if (cells == 0 || is_full) set_uniform(node, brick, is_full);
     return true;
   }
@@ -386,7 +385,7 @@ struct OccupancyTree::Impl {
   std::uint64_t drop(IVec3 chunk) {
     chunk_boxes.put(chunk, {});
     remove(chunk);
-    return kAll;
+    return trace::kAll;
   }
 
   // Replaces the `wanted` slabs of a chunk; other slabs stay unchanged. Returns the bricks that changed.
@@ -561,7 +560,7 @@ struct OccupancyTree::Impl {
     next = {};
     flat = {};
     flat = empty_tables(chunks, chunks);
-    for (const auto& [chunk, box] : chunk_boxes) flatten(flat, chunk, kAll);
+    for (const auto& [chunk, box] : chunk_boxes) flatten(flat, chunk, trace::kAll);
   }
 
   // ORs a row of bits from one table into another, where the bits are 0.

@@ -34,6 +34,7 @@ namespace quoin::trace {
 
 /// Bits of 16^3 units: word [z / 4][y / 4][x / 4], bit x % 4 + 4 (y % 4) + 16 (z % 4).
 using Node = std::array<std::uint64_t, 64>;
+inline constexpr std::uint64_t kAll = ~std::uint64_t{0};  ///< all units of a word
 
 /// Eight words of a brick, in storage order.
 using BrickLine = std::array<std::uint64_t, 8>;

@@ -289,9 +289,9 @@ bool is_one_value(const DensityNeighbourhood& around) {
 }
 
 /// The densities of a part of a chunk and one sample around it.
-class Window {
+class SampledPart {
  public:
-  Window() {
+  SampledPart() {
     values_.resize(std::size_t{kSide} * kSide * kSide);
     row_sums_.resize(values_.size());
   }
@@ -340,7 +340,7 @@ VoxelType prevailing_material(const DensityStore& store, IVec3 sample) {
   return most == counts.end() ? kAir : most->first;
 }
 
-Smoothed smoothed(const DensityStore& store, const Brush& brush, const ChunkPart& part, const Window& window) {
+Smoothed smoothed(const DensityStore& store, const Brush& brush, const ChunkPart& part, const SampledPart& window) {
   Smoothed result{part, {}, {}};
   const IVec3 size = part.box.size();
   result.densities.reserve(static_cast<std::size_t>(size.x * size.y * size.z));
@@ -391,7 +391,7 @@ std::int64_t DensityGrid::smooth(DVec3 centre, double radius, double strength) {
   if (is_empty(box)) return 0;
   std::vector<ChunkPart> parts;
   std::vector<Smoothed> news;
-  Window window;
+  SampledPart window;
   for (const ChunkPart& part : parts_near_chunks(store, box)) {
     if (!is_loaded_around(part.chunk)) continue;  // the result would depend on unknown samples
     const DensityNeighbourhood around = neighbourhood(part.chunk);

@@ -23,7 +23,6 @@ namespace quoin::models {
 namespace {
 
 constexpr std::string_view kBinvox = "#binvox";
-constexpr int kMaxEdge = 1 << 14;
 constexpr std::int64_t kMaxVoxels = std::int64_t{1} << 32;
 
 /// Lines of text, and then bytes.
@@ -125,7 +124,7 @@ Result<LoadedScene> read_binvox(std::span<const std::byte> bytes) {
   return builder.take("binvox");
 }
 
-constexpr FormatHolds kHolds = {.extension = ".binvox", .colours = false, .place_in_units = true};
+constexpr FormatHolds kBinvoxHolds = {.extension = ".binvox", .colours = false, .place_in_units = true};
 /// Some readers accept only cubes (trimesh). A cube is written if it is not much larger than the box, or small anyway.
 constexpr int kMaxCube = 1 << 8;
 constexpr std::int64_t kMostAir = 8;  // times the box
@@ -139,7 +138,7 @@ bool is_better_a_cube(const IVec3& size, int longest) {
 constexpr unsigned kLongestRun = 255;
 
 /// Returns the shortest text that parses to the same number.
-std::string text_of(double number) {
+std::string decimal(double number) {
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), number).ptr;
   QUOIN_ASSERT(end != text.data(), "at least one digit");
@@ -170,7 +169,7 @@ class RunWriter {
 
 /// Writes one grid of full and empty voxels, with its position and voxel size.
 Result<EncodedFile> write_binvox(const FormatOutput& output) {
-  auto merged = merge_grids(output.scene, kHolds);
+  auto merged = merge_grids(output.scene, kBinvoxHolds);
   if (!merged) return merged.error();
   if (merged->box.empty())
     return make_error(ErrorCode::Unsupported, "the scene has no voxels, and .binvox needs at least one");
@@ -187,12 +186,12 @@ Result<EncodedFile> write_binvox(const FormatOutput& output) {
   if (!(merged->voxel_size > kLeastVoxel && merged->voxel_size < kMostVoxel)) {
     return make_error(ErrorCode::Unsupported, "the voxel size is outside 1e-8 to 1e8 units");
   }
-  const auto numbers = [](const DVec3& v) { return text_of(v.x) + " " + text_of(v.y) + " " + text_of(v.z); };
+  const auto numbers = [](const DVec3& v) { return decimal(v.x) + " " + decimal(v.y) + " " + decimal(v.z); };
   ByteWriter out;
   out.text("#binvox 1\n");
   out.text("dim " + std::to_string(size.x) + " " + std::to_string(size.z) + " " + std::to_string(size.y) + "\n");
   out.text("translate " + numbers(DVec3(box.min) * merged->voxel_size) + "\n");
-  out.text("scale " + text_of(merged->voxel_size * longest) + "\ndata\n");
+  out.text("scale " + decimal(merged->voxel_size * longest) + "\ndata\n");
   RunWriter runs(out);
   // A slice of x crosses all rows, so slices are read at once for the width of a chunk.
   std::vector<bool> slices;

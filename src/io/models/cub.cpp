@@ -12,8 +12,6 @@ namespace quoin::models {
 
 namespace {
 
-constexpr int kMaxEdge = 1 << 14;
-
 bool is_cub(std::span<const std::byte> whole) {
   ByteReader reader(whole);
   std::uint64_t volume = 3;

@@ -40,7 +40,7 @@ namespace {
 constexpr std::string_view kMagic = "GOX ";
 constexpr int kBlockEdge = 16;
 constexpr std::size_t kBlockBytes = std::size_t{4} * kBlockEdge * kBlockEdge * kBlockEdge;
-constexpr std::int32_t kMaxPlace = 1 << 26;
+constexpr std::int32_t kMaxGoxelPlace = 1 << 26;
 
 class GoxelReader {
  public:
@@ -182,7 +182,9 @@ Status GoxelReader::read_layer(ByteReader& chunk) {
     Block block{chunk.u32(), {}};
     for (int axis = 0; axis < 3; ++axis) block.place[axis] = chunk.i32();
     static_cast<void>(chunk.u32());
-    const auto is_far = [&](int axis) { return block.place[axis] < -kMaxPlace || block.place[axis] > kMaxPlace; };
+    const auto is_far = [&](int axis) {
+      return block.place[axis] < -kMaxGoxelPlace || block.place[axis] > kMaxGoxelPlace;
+    };
     if (is_far(0) || is_far(1) || is_far(2)) return bad_at(at, "a block position is out of range");
     if (block.index >= blocks_.size()) return bad_at(at, "a layer refers to a block that does not exist");
     if (version_ == 1) block.place -= kBlockEdge / 2;
@@ -272,7 +274,7 @@ Status GoxelReader::put_shape(const Dict& dict, const Material& material, std::s
   const DBox box = box_of_shape(placed);
   const DVec3 size = box.max - box.min;
   const double farthest = std::max(glm::length(box.min), glm::length(box.max));
-  if (!(size.x * size.y * size.z <= kMostVoxels) || !(farthest < kMaxPlace)) {
+  if (!(size.x * size.y * size.z <= kMostVoxels) || !(farthest < kMaxGoxelPlace)) {
     return make_error(ErrorCode::LimitExceeded, "a shape has more than 2^27 voxels or is out of range", {}, at);
   }
   const glm::dmat4 shape_from_voxel = glm::inverse(placed);
@@ -312,9 +314,9 @@ bool is_goxel(std::span<const std::byte> beginning) {
   return ByteReader(beginning).text(4) == kMagic;
 }
 
-constexpr FormatHolds kHolds = {
+constexpr FormatHolds kGoxelHolds = {
     .extension = ".gox", .names = true, .hidden = true, .several = true, .transparency = true, .materials = true};
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kGoxelVersion = 2;
 
 /// The material of a layer; colours belong to voxels.
 struct Material {
@@ -341,7 +343,7 @@ class GoxelWriter {
       material_of_.push_back(found->second);
     }
     out_.text("GOX ");
-    out_.u32(kVersion);
+    out_.u32(kGoxelVersion);
   }
 
   Result<EncodedFile> run(const Progress& progress);
@@ -490,7 +492,7 @@ void GoxelWriter::write_layer(const PlacedGrid& grid, const Layer& layer, std::u
 }
 
 Result<EncodedFile> GoxelWriter::run(const Progress& progress) {
-  auto placed = place_grids(scene_, kHolds);
+  auto placed = place_grids(scene_, kGoxelHolds);
   if (!placed) return placed.error();
   std::vector<std::pair<const PlacedGrid*, Layer>> layers;
   std::int64_t split = 0;

@@ -12,6 +12,9 @@
 
 namespace quoin::models {
 
+/// Longer edges of models in files are refused, in voxels.
+inline constexpr int kMaxEdge = 1 << 14;
+
 /// The properties of a model in a file, except its voxels.
 struct Model {
   std::string name{};

@@ -32,8 +32,7 @@ namespace {
 constexpr std::string_view kTree = "QB 2";
 constexpr std::string_view kProject = "QBCL";
 constexpr std::string_view kExchange = "Qubicle Exchange Format";
-constexpr std::int32_t kMaxPlace = 1 << 26;
-constexpr int kMaxEdge = 1 << 14;
+constexpr std::int32_t kMaxQubiclePlace = 1 << 26;
 
 Rgba8 colour_of(std::uint32_t rgba, bool is_bgra) {
   const auto low = static_cast<std::uint8_t>(rgba);
@@ -76,7 +75,7 @@ Status check_range(const Matrix& matrix, std::size_t at) {
   for (int axis = 0; axis < 3; ++axis) {
     const int place = matrix.place[axis];
     is_sound &= matrix.size[axis] >= 0 && matrix.size[axis] <= kMaxEdge;
-    is_sound &= is_empty(matrix) || (place >= -kMaxPlace && place <= kMaxPlace);
+    is_sound &= is_empty(matrix) || (place >= -kMaxQubiclePlace && place <= kMaxQubiclePlace);
   }
   return is_sound ? Status() : Status(bad_at(at, "a matrix's size or position is out of range"));
 }
@@ -348,8 +347,8 @@ class QbclReader {
     static_cast<void>(reader_.take(4 + 4));
     const std::size_t version_at = reader_.position();
     const std::uint32_t version = reader_.u32();
-    constexpr std::uint32_t kVersion = 2;
-    if (!reader_.failed() && version != kVersion) {
+    constexpr std::uint32_t kTreeVersion = 2;
+    if (!reader_.failed() && version != kTreeVersion) {
       return make_error(ErrorCode::Unsupported,
                         "Qubicle project version " + std::to_string(version) + " is not supported", {}, version_at);
     }
@@ -536,8 +535,8 @@ Result<LoadedScene> read_qubicle(std::span<const std::byte> bytes) {
   return QbReader(bytes).read();
 }
 
-constexpr FormatHolds kHolds = {.extension = ".qb", .names = true, .several = true, .transparency = true};
-constexpr std::uint32_t kVersion = 0x0000'0101;
+constexpr FormatHolds kQubicleHolds = {.extension = ".qb", .names = true, .several = true, .transparency = true};
+constexpr std::uint32_t kQubicleVersion = 0x0000'0101;
 constexpr std::size_t kLongestName = 255;
 // The size limit of readers.
 constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 32;
@@ -548,9 +547,9 @@ std::uint32_t word_of(Rgba8 colour) {
 }
 
 /// Writes runs of equal words, which do not extend past a slice.
-class RunWriter {
+class QubicleRuns {
  public:
-  explicit RunWriter(ByteWriter& out) : out_(out) {}
+  explicit QubicleRuns(ByteWriter& out) : out_(out) {}
   void put(std::uint32_t word, std::uint32_t count = 1) {
     QUOIN_ASSERT(count > 0, "at least one voxel");
     if (count_ != 0 && word == word_) {
@@ -600,7 +599,7 @@ Status write_matrix(const PlacedGrid& grid, const std::vector<Rgba8>& colours, B
   for (int axis = 0; axis < 3; ++axis) out.i32(size[axis]);
   for (int axis = 0; axis < 3; ++axis) out.i32(grid.box.min[axis]);
   std::vector<VoxelType> row(static_cast<std::size_t>(size.x));
-  RunWriter runs(out);
+  QubicleRuns runs(out);
   for (int z = grid.box.min.z; z < grid.box.max.z; ++z) {
     for (int y = grid.box.min.y; y < grid.box.max.y; ++y) {
       read_voxels(grid.voxels, {grid.box.min.x, y, z}, row);
@@ -620,13 +619,13 @@ Status write_matrix(const PlacedGrid& grid, const std::vector<Rgba8>& colours, B
 
 /// Writes .qb: a matrix for each instance, with runs.
 Result<EncodedFile> write_qb(const FormatOutput& output) {
-  auto placed = place_grids(output.scene, kHolds);
+  auto placed = place_grids(output.scene, kQubicleHolds);
   if (!placed) return placed.error();
   if (placed->grids.empty())
     return make_error(ErrorCode::Unsupported, "the scene has no voxels, and .qb needs at least one");
   const std::vector<Rgba8> colours = colours_of(output.scene.types);
   ByteWriter out;
-  out.u32(kVersion);
+  out.u32(kQubicleVersion);
   out.u32(0);  // colours are red, green, blue, alpha
   out.u32(1);  // right-handed
   out.u32(1);  // runs

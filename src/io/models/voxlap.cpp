@@ -32,7 +32,7 @@ namespace {
 /// The colour of .vxl ground that no surface shows; the file has none for it.
 constexpr Rgba8 kEarth{101, 77, 51, 255};
 constexpr std::uint32_t kVoxlapMagic = 0x09072000;
-constexpr std::uint32_t kMaxEdge = 4096;
+constexpr std::uint32_t kMaxVoxlapEdge = 4096;
 constexpr std::size_t kPaletteBytes = 768;
 
 struct Sizes {
@@ -45,7 +45,7 @@ struct Sizes {
 std::optional<Sizes> read_sizes(ByteReader& reader) {
   const std::array<std::uint32_t, 3> edges = {reader.u32(), reader.u32(), reader.u32()};
   for (const std::uint32_t edge : edges) {
-    if (edge == 0 || edge > kMaxEdge) return std::nullopt;
+    if (edge == 0 || edge > kMaxVoxlapEdge) return std::nullopt;
   }
   return Sizes{static_cast<int>(edges[0]), static_cast<int>(edges[1]), static_cast<int>(edges[2])};
 }
@@ -224,8 +224,8 @@ VxlLayout layout_in_header(std::span<const std::byte> whole) {
   // The two sizes and the start position: a point and three axes.
   constexpr std::size_t kHeader = 12 + 12 * sizeof(double);
   VxlLayout layout{kVoxlapMap, kHeader};
-  layout.sizes.x = static_cast<int>(std::min(reader.u32(), kMaxEdge));
-  layout.sizes.y = static_cast<int>(std::min(reader.u32(), kMaxEdge));
+  layout.sizes.x = static_cast<int>(std::min(reader.u32(), kMaxVoxlapEdge));
+  layout.sizes.y = static_cast<int>(std::min(reader.u32(), kMaxVoxlapEdge));
   return layout;
 }
 

@@ -271,7 +271,7 @@ namespace {
 constexpr int kPlaceShift = 3;
 // The prior assumes that all lamps are visible: it weighs like this many samples of mean light.
 constexpr float kBelief = 0.5F;
-constexpr float kLeastShare = 0.05F;
+constexpr float kLeastNodeShare = 0.05F;
 
 }  // namespace
 
@@ -324,7 +324,7 @@ void LampMemory::learn() {
     if (!(belief > 1e-30F)) continue;
     for (std::size_t node = 0; node < LightTree::kTopNodes; ++node) {
       const float share = (lights[node].arrived + belief) / (lights[node].sent + belief);
-      table[node] = std::max(share, kLeastShare);
+      table[node] = std::max(share, kLeastNodeShare);
     }
   }
 }

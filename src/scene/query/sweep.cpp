@@ -16,13 +16,13 @@
 namespace quoin {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kEndless = std::numeric_limits<double>::infinity();
 // Voxels whose fractions differ by less are hit simultaneously.
 constexpr double kAtOnce = 1e-9;
 
 // A moving shape's contact with a voxel.
 struct Contact {
-  double fraction = kInfinity;
+  double fraction = kEndless;
   DVec3 normal{0.0};  // in the grid
   double depth = 0.0;
   int axis = -1;  // grid axis of the normal; 3 and more: other axes; -1: no contact
@@ -66,7 +66,7 @@ template <class ReachOf>
 Contact BoxAmongVoxels::inside_contact(DVec3 between, const ReachOf& reach_of) const {
   Contact contact;
   contact.fraction = 0.0;
-  contact.depth = kInfinity;
+  contact.depth = kEndless;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     if (axes_[i] == DVec3(0.0)) continue;
     const double offset = glm::dot(between, axes_[i]);
@@ -83,8 +83,8 @@ Contact BoxAmongVoxels::inside_contact(DVec3 between, const ReachOf& reach_of) c
 template <class ReachOf>
 Contact BoxAmongVoxels::meet(DVec3 between, double most, const ReachOf& reach_of) const {
   Contact contact;
-  double enter = -kInfinity;
-  double leave = kInfinity;
+  double enter = -kEndless;
+  double leave = kEndless;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     if (axes_[i] == DVec3(0.0)) continue;
     const double offset = glm::dot(between, axes_[i]);

@@ -11,12 +11,6 @@
 #include "trace/chunk_rows.h"
 
 namespace quoin::propagated {
-namespace {
-
-constexpr std::uint64_t kAll = ~std::uint64_t{0};
-
-}  // namespace
-
 LightLevels lamp_levels(const VoxelProperties& properties) {
   const float strength = 15.0F * std::clamp(properties.emission, 0.0F, 1.0F);
   const Rgba8& colour = properties.colour;

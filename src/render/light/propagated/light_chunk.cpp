@@ -7,12 +7,6 @@
 #include <quoin/core/assert.h>
 
 namespace quoin::propagated {
-namespace {
-
-constexpr std::uint64_t kAll = ~std::uint64_t{0};
-
-}  // namespace
-
 LightSlab LightSlab::of(const SlabPlanes& planes, const SlabKinds& kinds) {
   QUOIN_ASSERT((kinds.has_ones | kinds.has_zeros) == (1U << kPlanes) - 1, "each plane has ones or zeros");
   if ((kinds.has_ones & kinds.has_zeros) == 0) return LightSlab(kinds.has_ones);

@@ -13,7 +13,6 @@
 namespace quoin::propagated {
 namespace {
 
-constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr unsigned kBrightest = 15;
 
 std::uint64_t bits_between(int begin, int end) {

@@ -56,7 +56,6 @@ using propagated::rows_of;
 using propagated::type_lights;
 using propagated::TypeLight;
 
-constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr unsigned kBrightest = 15;
 
 // Returns the number of voxels around a region whose types the solver needs: it skips light that does not leave them,
@@ -192,7 +191,7 @@ std::array<unsigned, kChannels> highest_levels(const LightState& state, const Gr
 
 std::uint64_t bits_of(const IBox& voxels) {
   const int first = voxels.min.x & (kChunkEdge - 1);
-  return kAll >> (kChunkEdge - (voxels.max.x - voxels.min.x)) << first;
+  return propagated::kAll >> (kChunkEdge - (voxels.max.x - voxels.min.x)) << first;
 }
 
 // Returns the columns of a box that are open to the sky at height y.
@@ -353,7 +352,7 @@ bool is_below_open_sky(const LightState& state, const Grid& grid, IVec3 chunk) {
   if (grid.find_chunk(chunk) != nullptr) return false;
   const IVec3 low = chunk * kChunkEdge;
   const ColumnSet open = falling_columns(state, grid, {low, low + kChunkEdge}, low.y + kChunkEdge);
-  return std::all_of(open.begin(), open.end(), [](std::uint64_t row) { return row == kAll; });
+  return std::all_of(open.begin(), open.end(), [](std::uint64_t row) { return row == propagated::kAll; });
 }
 
 // Returns the edit of a chunk that was dark, as in `edit_of_entering`, and whose sky light is known to be 15 now.

@@ -11,9 +11,10 @@
 
 namespace quoin::propagated {
 
-inline constexpr std::size_t kPlanes = 4;      // bits of a level
-inline constexpr std::size_t kBlockRows = 8;   // rows along y processed at a time: one cache line
-inline constexpr std::size_t kSlabWords = 16;  // rows of a chunk slab: 4 along y, 4 along z
+inline constexpr std::size_t kPlanes = 4;                 // bits of a level
+inline constexpr std::size_t kBlockRows = 8;              // rows along y processed at a time: one cache line
+inline constexpr std::size_t kSlabWords = 16;             // rows of a chunk slab: 4 along y, 4 along z
+inline constexpr std::uint64_t kAll = ~std::uint64_t{0};  // all voxels of a row
 
 /// One step that spreads light from a level to the next lower one. Words are [z][column of words][y]. `layer` is the
 /// stride in words from z to z + 1, `column` the stride to the next word along x. Bit i of a layer's mask stands for
