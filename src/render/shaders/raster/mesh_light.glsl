@@ -1,5 +1,5 @@
 // The light of a mesh fragment, by rays through the content placed in the image's frame. The including file defines
-// `kTraces` (true if there are rays) and `kHasGlass` (true if there is glass).
+// `kTraces` (true if there are rays) and `kHasGlass` (true if there is glass), or PLAIN without rays.
 #include "walk.glsl"
 #include "instances.glsl"
 #include "glass.glsl"
@@ -12,6 +12,9 @@
 //
 // One loop over all rays; direct_light.glsl gives the reason.
 vec3 traced_light(ivec4 voxel, ivec3 base, vec3 from, vec3 normal, float diffuse, LevelPlace at) {
+#ifdef PLAIN
+  return sunlight_of(diffuse);
+#else
   if (!kTraces || voxel.w < 0) return sunlight_of(diffuse);
   Placed placed = placed_at(voxel.w);
   if (has(kPropagated)) return light_by_levels(at, placed);
@@ -37,6 +40,7 @@ vec3 traced_light(ivec4 voxel, ivec3 base, vec3 from, vec3 normal, float diffuse
     sum += light;
   }
   return sum;
+#endif
 }
 
 // The point to be lit: the arguments of `traced_light`, its position in front of the surface, and its own colours.

@@ -102,25 +102,51 @@ constexpr std::uint32_t kSmoothGlassFragment[] = {
 #include "smooth_glass.frag.inc"
 };
 
-constexpr std::array<std::span<const std::uint32_t>, 11> kCode = {
-    kSkyVertex, kSkyFragment,         kBlockyVertex,        kBlockyFragment, kSmoothVertex,     kSmoothFragment,
-    kFarVertex, kBlockyGlassFragment, kSmoothGlassFragment, kFarFragment,    kSmoothGlassVertex};
+constexpr std::uint32_t kBlockyPlainFragment[] = {
+#include "blocky_plain.frag.inc"
+};
+constexpr std::uint32_t kSmoothPlainFragment[] = {
+#include "smooth_plain.frag.inc"
+};
+
+enum Shader : std::size_t {
+  SkyVertex,
+  SkyFragment,
+  BlockyVertex,
+  BlockyFragment,
+  BlockyPlainFragment,
+  BlockyGlassFragment,
+  SmoothVertex,
+  SmoothFragment,
+  SmoothPlainFragment,
+  SmoothGlassVertex,
+  SmoothGlassFragment,
+  FarVertex,
+  FarFragment,
+  ShaderCount
+};
+constexpr std::array<std::span<const std::uint32_t>, ShaderCount> kCode = {
+    kSkyVertex,           kSkyFragment,  kBlockyVertex,   kBlockyFragment,      kBlockyPlainFragment,
+    kBlockyGlassFragment, kSmoothVertex, kSmoothFragment, kSmoothPlainFragment, kSmoothGlassVertex,
+    kSmoothGlassFragment, kFarVertex,    kFarFragment};
 
 // Returns the vertex and fragment shaders, as indices of `kCode`. Shaders for vision through glass take seconds to
-// compile on a CPU driver, so they are separate from all others.
+// compile on a CPU driver, so they are separate from all others; shaders with rays take a second.
 std::array<std::size_t, 2> shaders_of(const MeshWay& way) {
+  const bool is_depth = way.mode == kDrawDepth || way.mode == kDrawGlassDepth;
   const bool sees_through = way.glass_by_rays && way.mode != kDrawGlassDepth;
-  if (sees_through && way.what == MeshWay::What::Blocky) return {2, 7};
-  if (sees_through && way.what == MeshWay::What::Smooth) return {10, 8};
+  const bool is_plain = way.light == MeshLight::Plain || is_depth;
   switch (way.what) {
     case MeshWay::What::Sky:
-      return {0, 1};
+      return {SkyVertex, SkyFragment};
     case MeshWay::What::Blocky:
-      return {2, 3};
+      if (sees_through) return {BlockyVertex, BlockyGlassFragment};
+      return {BlockyVertex, is_plain ? BlockyPlainFragment : BlockyFragment};
     case MeshWay::What::Smooth:
-      return {4, 5};
+      if (sees_through) return {SmoothGlassVertex, SmoothGlassFragment};
+      return {SmoothVertex, is_plain ? SmoothPlainFragment : SmoothFragment};
     case MeshWay::What::Far:
-      return {6, 9};
+      return {FarVertex, FarFragment};
   }
   return {};
 }

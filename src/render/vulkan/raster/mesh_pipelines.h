@@ -56,7 +56,7 @@ class MeshPipelines {
   [[nodiscard]] Result<VkPipeline> pipeline(const MeshWay& way);
 
  private:
-  static constexpr std::size_t kShaders = 11;
+  static constexpr std::size_t kShaders = 13;
 
   explicit MeshPipelines(Device& device) : device_(&device) {}
   VkResult make_pass(std::uint32_t samples, VkRenderPass& pass) const;
