@@ -18,6 +18,7 @@
 #include <quoin/terrain/noise.h>
 
 #include "core/death_for_tests.h"
+#include "core/work/nightly_for_tests.h"
 #include "live/live_test_support.h"
 
 namespace quoin {
@@ -39,7 +40,8 @@ std::vector<SurfaceUpdate> all_of(LiveMeshes& meshes, const Scene& scene) {
 }
 
 TEST_P(LiveMeshesTest, MatchesFreshMeshesAfterRandomEdits) {
-  const unsigned seeds = kIsSlow && GetParam() == SurfaceStyle::Smooth ? 2 : 40;
+  const unsigned smooth = kIsSlow ? 2 : static_cast<unsigned>(cases(16, 40));
+  const unsigned seeds = GetParam() == SurfaceStyle::Smooth ? smooth : 40;
   for (unsigned seed = 0; seed < seeds; ++seed) {
     SCOPED_TRACE(seed);
     LiveMeshOptions wanted = options(1 + seed % 3);

@@ -170,7 +170,7 @@ TEST_F(Simplify, KeepsRandomBlobsClosed) {
   const std::uint32_t seed = is_nightly() ? std::random_device{}() : 20U;
   std::mt19937 random(seed);
   int tried = 0;
-  const int blobs = cases(10, 20);
+  const int blobs = cases(6, 20);
   for (int i = 0; i < blobs; ++i) {
     const SmoothMesh whole = surface_of(blob(random), 41);
     if (open_edges(whole) != 0) continue;  // two sheets in a cell

@@ -775,7 +775,7 @@ TEST(PropagatedLight, SnapshotsKeepLightAndUpdateIndependently) {
   light.update(grid, types);
   ChangeCursor cursor;
   EXPECT_TRUE(light.changes_since(cursor).all);
-  for (int round = 0; round < 4; ++round) {
+  for (int round = 0; round < cases(2, 4); ++round) {
     const PropagatedLight kept = light.snapshot();
     PropagatedLight other = light.snapshot();
     const Grid before = grid.snapshot();
