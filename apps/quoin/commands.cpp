@@ -116,22 +116,21 @@ void add_dimension_option(CLI::App& command, LoadOptions& load) {
 void add_pack_option(CLI::App& command, LoadOptions& load, PlainBlocks plain) {
   std::string help =
       "Resource pack of Minecraft for shapes and textures of its blocks: a folder, zip file or client .jar, or builtin "
-      "for Quoin's own pack; can be given several times, later packs override earlier ones";
+      "for Quoin's own pack; can be given several times, later packs override earlier ones and those of a scene file";
   if (plain == PlainBlocks::OwnPack) {
     load.packs = {kBuiltinPack};
     help += " (default builtin, which also has the blocks that other packs lack; none: cubes)";
+  } else {
+    help += " (none: also without those of a scene file)";
   }
   command
       .add_option_function<std::vector<std::string>>(
           "--pack",
           [&load, plain](const std::vector<std::string>& packs) {
             load.packs.assign(packs.begin(), packs.end());
-            if (plain == PlainBlocks::Cubes) return;
-            if (packs == std::vector<std::string>{"none"}) {
-              load.packs.clear();
-            } else {
-              load.packs.emplace_back(kBuiltinPack);
-            }
+            load.scene_packs = packs != std::vector<std::string>{kNoPack};
+            if (!load.scene_packs) load.packs.clear();
+            if (load.scene_packs && plain == PlainBlocks::OwnPack) load.packs = packs_for_images(std::move(load.packs));
           },
           help)
       ->type_name("PATH")

@@ -1,8 +1,14 @@
 #include "options.h"
 
+#include <filesystem>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
+#include <quoin/io/block_packs.h>
+
+#include "commands.h"
 
 namespace quoin::tool {
 
@@ -17,6 +23,24 @@ std::string parsed(CLI::App& command, const std::string& line, const std::vector
   }
   const Status fits = check_rules(command, rules);
   return fits ? "" : to_string(fits.error());
+}
+
+TEST(Options, ReadPacks) {
+  using Paths = std::vector<std::filesystem::path>;
+  const auto packs_of = [](const std::string& line, PlainBlocks plain, bool uses_those_of_scenes = true) {
+    CLI::App command;
+    LoadOptions load;
+    add_pack_option(command, load, plain);
+    EXPECT_EQ(parsed(command, line), "");
+    EXPECT_EQ(load.scene_packs, uses_those_of_scenes) << line;
+    return load.packs;
+  };
+  EXPECT_EQ(packs_of("", PlainBlocks::OwnPack), Paths{kBuiltinPack});
+  EXPECT_EQ(packs_of("--pack a.zip --pack b", PlainBlocks::OwnPack), (Paths{"a.zip", "b", kBuiltinPack}));
+  EXPECT_EQ(packs_of("--pack none", PlainBlocks::OwnPack, false), Paths{});
+  EXPECT_EQ(packs_of("", PlainBlocks::Cubes), Paths{});
+  EXPECT_EQ(packs_of("--pack a.zip --pack b", PlainBlocks::Cubes), (Paths{"a.zip", "b"}));
+  EXPECT_EQ(packs_of("--pack none", PlainBlocks::Cubes, false), Paths{});
 }
 
 TEST(Options, StoreParsedValues) {

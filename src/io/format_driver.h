@@ -61,6 +61,8 @@ struct FormatDriver {
   };
   Source source = Source::Bytes;
   Result<LoadedScene> (*read)(const FormatInput& input) = nullptr;
+  /// `read` gives types the looks of LoadOptions::packs itself.
+  bool applies_packs = false;
   /// Reads triangles in the file's axes. `sidecars` reads the files that it names.
   Result<LoadedMesh> (*read_mesh)(std::span<const std::byte> bytes, triangles::SidecarReader& sidecars) = nullptr;
   /// Opens a world that is read by chunks. Only bytes: `path` is empty.

@@ -95,10 +95,30 @@ Result<LoadedScene> read_triangles(const FormatDriver& driver, const FormatInput
   return triangles::scene_from_mesh(std::move(*mesh), options, name, input.threads, input.progress);
 }
 
+/// Gives the result of `read` the looks of the packs, which are opened first.
+template <class Read>
+Result<LoadedScene> read_with_packs(const LoadOptions& options, Read read) {
+  if (options.packs.empty() && options.pack_zips.empty()) return read();
+  const auto packs = BlockPacks::open(options.packs, options.pack_zips);
+  if (!packs) return packs.error();
+  Result<LoadedScene> loaded = read();
+  if (!loaded) return loaded;
+  (*packs)->apply(loaded->scene.types);
+  if (std::string line = to_string((*packs)->report()); !line.empty()) loaded->warnings.push_back(std::move(line));
+  return loaded;
+}
+
 Result<LoadedScene> read_with(const FormatDriver& driver, const FormatInput& input) {
   if (!driver.left_out.empty()) return left_out_error(driver);
-  if (driver.read != nullptr) return driver.read(input);
-  return driver.open_chunks != nullptr ? read_around_spawn(driver, input) : read_triangles(driver, input);
+  if (driver.applies_packs) return driver.read(input);
+  return read_with_packs(input.options, [&] {
+    if (driver.read != nullptr) return driver.read(input);
+    return driver.open_chunks != nullptr ? read_around_spawn(driver, input) : read_triangles(driver, input);
+  });
+}
+
+Result<LoadedScene> read_raw(const FormatInput& input) {
+  return read_with_packs(input.options, [&] { return read_volume_scene(input); });
 }
 
 /// `format`: the result of detect_format.
@@ -160,6 +180,7 @@ std::vector<std::string> lost_views(const FormatOutput& output, const FormatInfo
   }
   if (output.loaded == nullptr) return lines;
   const LoadedScene& loaded = *output.loaded;
+  for (const std::string& pack : loaded.unused_packs) lines.push_back("resource pack left out: " + printable(pack));
   // `lost_with_source` already lists the file's own items.
   const auto is_reported = [said = lost_with_source(output)](std::string_view item) {
     return std::ranges::any_of(said, [&](const std::string& line) { return line.find(item) != std::string::npos; });
@@ -420,30 +441,11 @@ Result<std::vector<std::string>> unsupported_features(const LoadedScene& loaded,
   return warnings_of_saving({loaded.scene, &loaded, {}, {}}, path);
 }
 
-namespace {
-
-/// Gives the result of `read` the looks of the packs, which are opened first.
-template <class Read>
-Result<LoadedScene> read_with_packs(const LoadOptions& options, Read read) {
-  if (options.packs.empty()) return read();
-  const auto packs = BlockPacks::open(options.packs);
-  if (!packs) return packs.error();
-  Result<LoadedScene> loaded = read();
-  if (!loaded) return loaded;
-  (*packs)->apply(loaded->scene.types);
-  if (std::string line = to_string((*packs)->report()); !line.empty()) loaded->warnings.push_back(std::move(line));
-  return loaded;
-}
-
-}  // namespace
-
 Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options, Threads threads,
                                const Progress& progress) {
   const FormatInput input{{}, bytes, options, threads, progress};
-  return read_with_packs(options, [&] {
-    if (options.raw) return read_volume_scene(input);
-    return read_as(options.heights ? FileFormat::Heights : detect_format(bytes), input);
-  });
+  if (options.raw) return read_raw(input);
+  return read_as(options.heights ? FileFormat::Heights : detect_format(bytes), input);
 }
 
 std::vector<std::filesystem::path> sidecar_files_of(const std::filesystem::path& path, SidecarFiles allowed) {
@@ -466,13 +468,11 @@ Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOpti
   return file ? load_scene(*file, options, threads, progress) : Result<LoadedScene>(file.error());
 }
 
-namespace {
-
-Result<LoadedScene> read_detected(const DetectedFile& file, const LoadOptions& options, Threads threads,
-                                  const Progress& progress) {
+Result<LoadedScene> load_scene(const DetectedFile& file, const LoadOptions& options, Threads threads,
+                               const Progress& progress) {
   const std::filesystem::path& path = file.path;
   FormatInput input{path, {}, options, threads, progress};
-  if (options.raw) return with_path(read_volume_scene(input), path);
+  if (options.raw) return with_path(read_raw(input), path);
   std::optional<FileFormat> format = options.heights ? FileFormat::Heights : file.format;
   const auto source = format ? driver_of(*format).source : FormatDriver::Source::Bytes;
   if (source == FormatDriver::Source::Path) return with_path(read_as(format, input), path);
@@ -489,13 +489,6 @@ Result<LoadedScene> read_detected(const DetectedFile& file, const LoadOptions& o
     if (of_all || !can(format, FormatCapability::Meshes)) format = of_all;
   }
   return with_path(read_as(format, input), path);
-}
-
-}  // namespace
-
-Result<LoadedScene> load_scene(const DetectedFile& file, const LoadOptions& options, Threads threads,
-                               const Progress& progress) {
-  return read_with_packs(options, [&] { return read_detected(file, options, threads, progress); });
 }
 
 Result<std::unique_ptr<ChunkSource>> open_chunk_source(const std::filesystem::path& path, std::string_view dimension) {

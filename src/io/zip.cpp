@@ -270,6 +270,16 @@ std::vector<std::string> ZipParts::names() const {
   return names;
 }
 
+std::uint32_t crc32_of(std::span<const std::byte> bytes) {
+  return static_cast<std::uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+ZipParts::Sum ZipParts::sum_of(std::string_view name) const {
+  QUOIN_ASSERT(has(name), "a file of the zip file");
+  const Entry& entry = entries_.find(name)->second;
+  return {entry.size, entry.crc};
+}
+
 Result<std::vector<std::byte>> ZipParts::read(std::string_view name, std::uint64_t max_bytes) const {
   QUOIN_ASSERT(has(name), "a file of the zip file");
   const Entry& entry = entries_.find(name)->second;
@@ -299,8 +309,7 @@ Result<std::vector<std::byte>> ZipParts::read(std::string_view name, std::uint64
   std::vector<std::byte> content(static_cast<std::size_t>(entry.size));
   const auto read = stream.read(content);
   if (!read || *read != content.size()) return bad_at(entry.at, printable(name) + " is damaged");
-  const auto* const bytes = reinterpret_cast<const Bytef*>(content.data());
-  if (static_cast<std::uint32_t>(crc32_z(0, bytes, content.size())) != entry.crc) {
+  if (crc32_of(content) != entry.crc) {
     return bad_at(entry.at, printable(name) + " is damaged: its checksum is wrong");
   }
   return content;

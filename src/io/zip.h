@@ -15,6 +15,9 @@
 
 namespace quoin {
 
+/// Returns the CRC-32 of bytes, as zip files store it.
+[[nodiscard]] std::uint32_t crc32_of(std::span<const std::byte> bytes);
+
 /// Writes texts to a zip file one after another, compressed. The bytes are the same on every run.
 ///
 /// Source: PKWARE, ".ZIP File Format Specification" 6.3.3. Memory: the compressed bytes.
@@ -57,6 +60,12 @@ class ZipParts {
   /// The names as stored in the directory.
   [[nodiscard]] std::vector<std::string> names() const;
   [[nodiscard]] bool has(std::string_view name) const { return entries_.contains(name); }
+  /// The expanded size and CRC-32 of a file, as stored in the directory. Requires: has(name).
+  struct Sum {
+    std::uint64_t size = 0;
+    std::uint32_t crc = 0;
+  };
+  [[nodiscard]] Sum sum_of(std::string_view name) const;
   /// Returns a file's content. Memory: its size, which is limited by its compressed bytes.
   /// Errors: BadFormat, also for a wrong checksum; Unsupported for other compressions and for encrypted files;
   ///         LimitExceeded if it expands to more than `max_bytes`, before it is expanded. Requires: has(name).

@@ -18,6 +18,20 @@ namespace [[gnu::visibility("default")]] quoin {
 /// this name is "./builtin".
 inline constexpr const char* kBuiltinPack = "builtin";
 
+/// The name that stands for no pack where a user names packs for images (packs_for_images).
+inline constexpr const char* kNoPack = "none";
+
+/// Returns the packs that images use if a user names `named`: these with kBuiltinPack below them. None for kNoPack
+/// alone.
+[[nodiscard]] std::vector<std::filesystem::path> packs_for_images(std::vector<std::filesystem::path> named);
+
+/// Returns a hash of a pack's content: 16 hexadecimal digits of a hash over the names, sizes and CRC-32 of the files
+/// below `assets`, in the order of their names. A zip file and the folder with its files have the same hash. Files
+/// above 64 MiB, which are never used, do not count.
+/// Cost: reads only the directory of a zip file after opening it, and all files of a folder.
+/// Errors: those of BlockPacks::open; LimitExceeded for a folder with more than 1,048,576 files and folders or 2 GiB.
+[[nodiscard]] Result<std::string> hash_of_pack(const std::filesystem::path& path);
+
 /// The counts of BlockPacks::apply, over all calls.
 struct BlockPackReport {
   std::size_t types = 0;           ///< Minecraft blocks
@@ -51,6 +65,9 @@ class BlockPacks {
   [[nodiscard]] static Result<std::shared_ptr<BlockPacks>> open(std::span<const std::filesystem::path> paths);
   /// As above, from the bytes of zip files.
   [[nodiscard]] static Result<std::shared_ptr<BlockPacks>> open(std::vector<std::vector<std::byte>> zips);
+  /// As above: the packs `zips` override the packs `paths`.
+  [[nodiscard]] static Result<std::shared_ptr<BlockPacks>> open(std::span<const std::filesystem::path> paths,
+                                                                std::vector<std::vector<std::byte>> zips);
   ~BlockPacks();
   BlockPacks(const BlockPacks&) = delete;
   BlockPacks& operator=(const BlockPacks&) = delete;

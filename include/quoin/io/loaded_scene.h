@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -53,6 +54,7 @@ struct LoadedScene {
   std::shared_ptr<const VoxSource> source = nullptr;  ///< for a .vox file, with LoadOptions::keep_source
   std::string dimension{};                            ///< Minecraft: the dimension that was read
   std::vector<std::string> dimensions{};              ///< Minecraft: all dimensions; LoadOptions::dimension selects one
+  std::vector<std::string> unused_packs{};  ///< resource packs of a scene file that are missing or changed, not used
 };
 
 /// Options for converting triangles to voxels.
@@ -86,6 +88,10 @@ struct LoadOptions {
   /// Resource packs of Minecraft for the looks of its blocks, the lowest first (BlockPacks). A warning counts the
   /// blocks and textures that they lack. Types of other formats stay as they are.
   std::vector<std::filesystem::path> packs{};
+  /// The bytes of more resource packs (zip files), above `packs`.
+  std::vector<std::vector<std::byte>> pack_zips{};
+  /// Gives the files of a scene file the packs that it names for them, below `packs`. If false, they are not read.
+  bool scene_packs = true;
   /// If set, reads the file as raw values: a volume of this size and type.
   std::optional<RawVolume> raw = std::nullopt;
   /// If set, reads the file as a height map. This cannot be detected for images. A .hgt file is recognised by its name

@@ -24,9 +24,16 @@ namespace [[gnu::visibility("default")]] quoin {
 /// A scene file may contain models (`types` and `grids`), name model files (`sources`), or both. Types from named files
 /// are appended to its own types.
 struct SceneFile {
+  /// A resource pack of Minecraft. A pack with another hash, or that cannot be read, is not used, and the loaded scene
+  /// has a warning.
+  struct Pack {
+    std::string file;       ///< relative to the scene file, or kBuiltinPack
+    std::string hash = {};  ///< 16 hexadecimal digits (hash_of_pack); empty: any content
+  };
   struct Source {
     std::string id;
-    std::string file;  ///< relative to the scene file
+    std::string file;              ///< relative to the scene file
+    std::vector<Pack> packs = {};  ///< for the looks of its Minecraft blocks, the lowest first
   };
   /// An instance of a grid, or of all that a source contains. Indices replace the handles of `instance`, which are not
   /// used. A source is scaled by `voxel_size`, and its rotation is unit.
@@ -60,7 +67,8 @@ struct SceneFile {
 ///
 /// Errors: BadFormat, with the byte offset for invalid JSON, else with the path of the value ("instances[3].rotation:
 ///         ..."), also for unknown keys; Unsupported for a later version; LimitExceeded beyond 64 MiB outside of
-///         strings or 2 GiB in total, 32 levels of nesting, 65,536 files, or 4,194,304 grids, instances or lamps.
+///         strings or 2 GiB in total, 32 levels of nesting, 65,536 files, 64 packs of a file, or 4,194,304 grids,
+///         instances or lamps.
 ///         LimitExceeded also for voxels that need more memory than 64 MiB plus 64 times the file's size; files from
 ///         `write_scene_file` never do. Errors inside voxel data include the offset in that data ("grids[0].voxels[2]:
 ///         byte 37 of the voxel data: ...").
@@ -73,6 +81,11 @@ struct SceneFile {
 ///
 /// Errors: InvalidArgument for an instance whose grid does not exist.
 [[nodiscard]] Result<SceneFile> scene_file_of(const Scene& scene);
+
+/// Returns the entry of a pack in a scene file: its path relative to the scene's folder if there is one, else its
+/// absolute path, and its hash. `scene_path`: the scene file, which need not exist. Errors: those of hash_of_pack.
+[[nodiscard]] Result<SceneFile::Pack> scene_pack_of(const std::filesystem::path& pack,
+                                                    const std::filesystem::path& scene_path);
 
 /// Returns the text of a scene file. `parse_scene_file` restores every number exactly, except that rotations of
 /// placed `sources`, and the sun's direction where nothing else of the environment is stored, are normalised. The same

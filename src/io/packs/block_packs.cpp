@@ -1,6 +1,7 @@
 #include <quoin/io/block_packs.h>
 
 #include <algorithm>
+#include <array>
 #include <mutex>
 #include <optional>
 #include <string_view>
@@ -68,6 +69,20 @@ std::string to_string(const BlockPackReport& report) {
   return text + names + (report.names.size() < all ? ", ..." : "");
 }
 
+std::vector<std::filesystem::path> packs_for_images(std::vector<std::filesystem::path> named) {
+  if (named == std::vector<std::filesystem::path>{kNoPack}) return {};
+  if (std::ranges::find(named, std::filesystem::path(kBuiltinPack)) == named.end()) named.emplace_back(kBuiltinPack);
+  return named;
+}
+
+Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::span<const std::filesystem::path> paths) {
+  return open(paths, {});
+}
+
+Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::vector<std::vector<std::byte>> zips) {
+  return open({}, std::move(zips));
+}
+
 #ifdef QUOIN_WITHOUT_GAME_WORLDS
 
 // There are no objects in such builds.
@@ -87,15 +102,16 @@ Error packs_left_out() {
 
 }  // namespace
 
-Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::span<const std::filesystem::path> paths) {
+Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::span<const std::filesystem::path> paths,
+                                                     std::vector<std::vector<std::byte>> zips) {
   const std::filesystem::path own(kBuiltinPack);
-  const bool has_others = std::ranges::any_of(paths, [&](const std::filesystem::path& path) { return path != own; });
+  const bool has_others = !zips.empty() || std::ranges::any_of(paths, [&](const auto& path) { return path != own; });
   // Without readers of blocks there are none to give a look to.
   return has_others ? Result<std::shared_ptr<BlockPacks>>(packs_left_out())
                     : std::shared_ptr<BlockPacks>(new BlockPacks(std::make_unique<Content>()));
 }
 
-Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::vector<std::vector<std::byte>> /*zips*/) {
+Result<std::string> hash_of_pack(const std::filesystem::path& /*path*/) {
   return packs_left_out();
 }
 
@@ -120,25 +136,24 @@ struct BlockPacks::Content {
   packs::BlockLooks looks;
 };
 
-Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::span<const std::filesystem::path> paths) {
+Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::span<const std::filesystem::path> paths,
+                                                     std::vector<std::vector<std::byte>> zips) {
   std::vector<std::filesystem::path> named(paths.begin(), paths.end());
   const bool has_own = std::erase(named, std::filesystem::path(kBuiltinPack)) > 0;
-  auto files = packs::PackStack::open(named);
+  auto files = packs::PackStack::open(named, std::move(zips));
   if (!files) return files.error();
   std::shared_ptr<const packs::PackFiles> own;
   if (has_own) own = std::make_shared<const LazyOwnPack>();
   return std::shared_ptr<BlockPacks>(new BlockPacks(std::make_unique<Content>(std::move(*files), std::move(own))));
 }
 
-Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::vector<std::vector<std::byte>> zips) {
-  std::vector<std::shared_ptr<const packs::PackFiles>> opened;
-  for (std::vector<std::byte>& zip : zips) {
-    auto pack = packs::open_pack(std::move(zip));
-    if (!pack) return pack.error();
-    opened.push_back(std::move(*pack));
-  }
-  auto files = std::make_shared<const packs::PackStack>(std::move(opened));
-  return std::shared_ptr<BlockPacks>(new BlockPacks(std::make_unique<Content>(std::move(files))));
+Result<std::string> hash_of_pack(const std::filesystem::path& path) {
+  const auto hash = packs::hash_of_files(path);
+  if (!hash) return hash.error();
+  constexpr int kDigits = 16;
+  std::array<char, kDigits> digits{};
+  for (int i = 0; i < kDigits; ++i) digits[i] = "0123456789abcdef"[*hash >> 4 * (kDigits - 1 - i) & 0xFU];
+  return std::string(digits.begin(), digits.end());
 }
 
 #endif

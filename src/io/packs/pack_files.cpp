@@ -12,6 +12,7 @@
 #include "core/bytes/bytes.h"
 #include "core/bytes/files.h"
 #include "core/bytes/text.h"
+#include "core/rows/packed_row.h"
 #include "io/zip.h"
 
 namespace quoin::packs {
@@ -22,6 +23,12 @@ namespace fs = std::filesystem;
 using FileBytes = std::optional<std::vector<std::byte>>;
 
 constexpr std::size_t kMaxZipBytes = std::size_t{2} << 30;
+// Limits of a folder whose content is hashed.
+constexpr std::size_t kMaxEntries = std::size_t{1} << 20;
+constexpr std::uint64_t kMaxFolderBytes = kMaxZipBytes;
+
+/// The sizes and CRC-32 of a pack's files below `assets`.
+using FileSums = std::map<std::string, ZipParts::Sum>;
 
 Error too_large(std::string_view path, std::uint64_t size, std::size_t most) {
   return make_error(ErrorCode::LimitExceeded, printable(path) + " has " + std::to_string(size) + " bytes: at most " +
@@ -61,7 +68,7 @@ class FolderPack final : public PackFiles {
 
 class ZipPack final : public PackFiles {
  public:
-  static Result<std::shared_ptr<const PackFiles>> open(std::vector<std::byte> bytes) {
+  static Result<std::shared_ptr<const ZipPack>> open(std::vector<std::byte> bytes) {
     if (!text_of(bytes).starts_with("PK")) {
       return make_error(ErrorCode::BadFormat, "not a resource pack: neither a folder nor a zip file", {}, 0);
     }
@@ -74,7 +81,18 @@ class ZipPack final : public PackFiles {
       return make_error(ErrorCode::InvalidArgument, "not a resource pack: the zip file has no folder assets");
     }
     pack->prefix_ = *prefix;
-    return std::shared_ptr<const PackFiles>(pack);
+    return std::shared_ptr<const ZipPack>(pack);
+  }
+
+  [[nodiscard]] FileSums sums() const {
+    FileSums sums;
+    for (const std::string& name : parts_.names()) {
+      if (!name.starts_with(prefix_)) continue;
+      const std::string path = name.substr(prefix_.size());
+      const ZipParts::Sum sum = parts_.sum_of(name);
+      if (path.starts_with("assets/") && is_pack_path(path) && sum.size <= kMaxImageBytes) sums.emplace(path, sum);
+    }
+    return sums;
   }
 
   [[nodiscard]] Result<FileBytes> read(std::string_view path, std::size_t max_bytes) const override {
@@ -106,6 +124,49 @@ class ZipPack final : public PackFiles {
   std::string prefix_;
 };
 
+Result<std::shared_ptr<const ZipPack>> open_zip_pack(const fs::path& path) {
+  std::error_code error;
+  const std::uint64_t size = fs::file_size(path, error);
+  if (!error && size > kMaxZipBytes) return too_large(path.string(), size, kMaxZipBytes);
+  auto bytes = read_file(path);
+  if (!bytes) return bytes.error();
+  return with_path(ZipPack::open(std::move(*bytes)), path);
+}
+
+Error no_assets(const fs::path& folder) {
+  return make_error(ErrorCode::InvalidArgument, "not a resource pack: the folder has no folder assets",
+                    folder.string());
+}
+
+Result<FileSums> sums_of_folder(const fs::path& folder) {
+  FileSums sums;
+  std::size_t entries = 0;
+  std::uint64_t bytes = 0;
+  std::error_code error;
+  constexpr auto kOptions = fs::directory_options::follow_directory_symlink;
+  for (fs::recursive_directory_iterator at(folder / "assets", kOptions, error), end; !error && at != end;
+       at.increment(error)) {
+    if (++entries > kMaxEntries) {
+      return make_error(ErrorCode::LimitExceeded,
+                        "the folder has more than " + std::to_string(kMaxEntries) + " files and folders",
+                        folder.string());
+    }
+    const std::string path = at->path().lexically_relative(folder).generic_string();
+    std::error_code unknown;
+    if (!is_pack_path(path)) {
+      at.disable_recursion_pending();
+    } else if (at->is_regular_file(unknown) && at->file_size(unknown) <= kMaxImageBytes) {
+      const auto content = read_file(at->path());
+      if (!content) return content.error();
+      bytes += content->size();
+      if (bytes > kMaxFolderBytes) return too_large(folder.string(), bytes, kMaxFolderBytes);
+      sums.emplace(path, ZipParts::Sum{content->size(), crc32_of(*content)});
+    }
+  }
+  if (error) return make_error(ErrorCode::CannotRead, error.message(), folder.string());
+  return sums;
+}
+
 }  // namespace
 
 bool is_pack_path(std::string_view path) {
@@ -125,21 +186,40 @@ bool is_pack_path(std::string_view path) {
 Result<std::shared_ptr<const PackFiles>> open_pack(const fs::path& path) {
   std::error_code error;
   if (fs::is_directory(path, error)) {
-    if (!fs::is_directory(path / "assets", error)) {
-      return make_error(ErrorCode::InvalidArgument, "not a resource pack: the folder has no folder assets",
-                        path.string());
-    }
+    if (!fs::is_directory(path / "assets", error)) return no_assets(path);
     return std::shared_ptr<const PackFiles>(std::make_shared<FolderPack>(path));
   }
-  const std::uint64_t size = fs::file_size(path, error);
-  if (!error && size > kMaxZipBytes) return too_large(path.string(), size, kMaxZipBytes);
-  auto bytes = read_file(path);
-  if (!bytes) return bytes.error();
-  return with_path(ZipPack::open(std::move(*bytes)), path);
+  auto pack = open_zip_pack(path);
+  if (!pack) return pack.error();
+  return std::shared_ptr<const PackFiles>(std::move(*pack));
 }
 
 Result<std::shared_ptr<const PackFiles>> open_pack(std::vector<std::byte> zip) {
-  return ZipPack::open(std::move(zip));
+  auto pack = ZipPack::open(std::move(zip));
+  if (!pack) return pack.error();
+  return std::shared_ptr<const PackFiles>(std::move(*pack));
+}
+
+Result<std::uint64_t> hash_of_files(const fs::path& path) {
+  FileSums sums;
+  std::error_code error;
+  if (fs::is_directory(path, error)) {
+    if (!fs::is_directory(path / "assets", error)) return no_assets(path);
+    auto found = sums_of_folder(path);
+    if (!found) return found.error();
+    sums = std::move(*found);
+  } else {
+    const auto pack = open_zip_pack(path);
+    if (!pack) return pack.error();
+    sums = (*pack)->sums();
+  }
+  std::uint64_t hash = kHashSeed;
+  for (const auto& [name, sum] : sums) {
+    hash = mixed_with(hash, name.size());
+    for (const char c : name) hash = mixed_with(hash, static_cast<unsigned char>(c));
+    hash = mixed_with(mixed_with(hash, sum.size), sum.crc);
+  }
+  return hash;
 }
 
 void MemoryPack::put(std::string_view path, std::string content) {
@@ -157,10 +237,16 @@ Result<FileBytes> MemoryPack::read(std::string_view path, std::size_t max_bytes)
   return FileBytes(std::move(bytes));
 }
 
-Result<std::shared_ptr<const PackStack>> PackStack::open(std::span<const fs::path> paths) {
+Result<std::shared_ptr<const PackStack>> PackStack::open(std::span<const fs::path> paths,
+                                                         std::vector<std::vector<std::byte>> zips) {
   std::vector<std::shared_ptr<const PackFiles>> packs;
   for (const fs::path& path : paths) {
     auto pack = open_pack(path);
+    if (!pack) return pack.error();
+    packs.push_back(std::move(*pack));
+  }
+  for (std::vector<std::byte>& zip : zips) {
+    auto pack = open_pack(std::move(zip));
     if (!pack) return pack.error();
     packs.push_back(std::move(*pack));
   }

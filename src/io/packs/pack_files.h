@@ -53,6 +53,10 @@ class PackFiles {
 /// Opens the bytes of a zip file as a pack. Errors: as open_pack.
 [[nodiscard]] Result<std::shared_ptr<const PackFiles>> open_pack(std::vector<std::byte> zip);
 
+/// Returns a hash over the names, sizes and CRC-32 of a pack's files (hash_of_pack). Errors: as open_pack, and
+/// LimitExceeded for folders with too many files.
+[[nodiscard]] Result<std::uint64_t> hash_of_files(const std::filesystem::path& path);
+
 /// Files in memory, by path.
 class MemoryPack final : public PackFiles {
  public:
@@ -75,8 +79,9 @@ class PackStack final : public PackFiles {
   PackStack() = default;
   explicit PackStack(std::vector<std::shared_ptr<const PackFiles>> packs) : packs_(std::move(packs)) {}
 
-  /// Opens packs, the lowest first. Errors: as open_pack.
-  [[nodiscard]] static Result<std::shared_ptr<const PackStack>> open(std::span<const std::filesystem::path> paths);
+  /// Opens packs, the lowest first; those of bytes are above those of paths. Errors: as open_pack.
+  [[nodiscard]] static Result<std::shared_ptr<const PackStack>> open(std::span<const std::filesystem::path> paths,
+                                                                     std::vector<std::vector<std::byte>> zips);
   [[nodiscard]] Result<std::optional<std::vector<std::byte>>> read(std::string_view path,
                                                                    std::size_t max_bytes) const override;
 

@@ -1,7 +1,10 @@
 #include <array>
 #include <map>
 #include <optional>
+#include <system_error>
+#include <utility>
 
+#include <quoin/io/block_packs.h>
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 
@@ -148,6 +151,82 @@ Instance placed(const Instance& inner, const Instance& outer, bool is_alone) {
   return instance;
 }
 
+/// The resource packs of a scene: LoadOptions::packs for its own types, below them the packs that it names for a file.
+class ScenePacks {
+ public:
+  /// `path`: the scene file.
+  ScenePacks(const std::filesystem::path& path, const LoadOptions& options) : path_(path), options_(options) {}
+
+  /// Gives types of the scene itself their looks. Errors: those of BlockPacks::open.
+  Status apply(VoxelRegistry& types) { return apply_stack({}, types); }
+
+  /// Gives the types of a file that the scene names their looks. Leaves out packs that cannot be used, with a warning.
+  Status apply(const SceneFile::Source& source, VoxelRegistry& types, LoadedScene& loaded) {
+    std::vector<std::filesystem::path> usable;
+    for (const SceneFile::Pack& pack : source.packs) {
+      if (!options_.scene_packs) break;
+      if (auto found = find(pack, loaded)) usable.push_back(std::move(*found));
+    }
+    return apply_stack(usable, types);
+  }
+
+  /// Adds a warning for each stack of packs that lacks something.
+  void report(LoadedScene& loaded) const {
+    for (const auto& [list, packs] : opened_) {
+      std::string line = packs == nullptr ? "" : to_string(packs->report());
+      if (!line.empty()) loaded.warnings.push_back(std::move(line));
+    }
+  }
+
+ private:
+  Status apply_stack(std::vector<std::filesystem::path> stack, VoxelRegistry& types) {
+    stack.insert(stack.end(), options_.packs.begin(), options_.packs.end());
+    const auto [at, is_new] = opened_.try_emplace(stack);
+    if (is_new && !(stack.empty() && options_.pack_zips.empty())) {
+      auto packs = BlockPacks::open(stack, options_.pack_zips);
+      if (!packs) return packs.error();
+      at->second = std::move(*packs);
+    }
+    if (at->second != nullptr) at->second->apply(types);
+    return {};
+  }
+
+  /// Returns the path of a pack that can be used, else nullopt and adds a warning when it is first asked for.
+  std::optional<std::filesystem::path> find(const SceneFile::Pack& pack, LoadedScene& loaded) {
+    const auto [at, is_new] = found_.try_emplace({pack.file, pack.hash});
+    if (!is_new) return at->second;
+    auto path = check(pack);
+    if (path) {
+      at->second = std::move(*path);
+    } else {
+      loaded.warnings.push_back("cannot use the resource pack \"" + printable(pack.file) +
+                                "\" of the scene file: " + to_string(path.error()));
+      loaded.unused_packs.push_back(pack.file);
+    }
+    return at->second;
+  }
+
+  [[nodiscard]] Result<std::filesystem::path> check(const SceneFile::Pack& pack) const {
+    if (pack.file == kBuiltinPack) return std::filesystem::path(kBuiltinPack);
+    auto path = sidecar_path(path_, pack.file, options_.sidecar_files);
+    if (!path) return path;
+    if (pack.hash.empty()) {
+      const auto opened = BlockPacks::open(std::span(&*path, 1));
+      return opened ? path : opened.error();
+    }
+    const auto hash = hash_of_pack(*path);
+    if (!hash) return hash.error();
+    if (*hash == pack.hash) return path;
+    return make_error(ErrorCode::BadFormat, "it has changed: its hash is " + *hash + ", not " + pack.hash +
+                                                "; without \"hash\" the scene file accepts any content");
+  }
+
+  const std::filesystem::path& path_;
+  const LoadOptions& options_;
+  std::map<std::vector<std::filesystem::path>, std::shared_ptr<BlockPacks>> opened_;           // null: no packs
+  std::map<std::pair<std::string, std::string>, std::optional<std::filesystem::path>> found_;  // by path and hash
+};
+
 Result<LoadedScene> put_together(SceneFile& file, const std::filesystem::path& path, const LoadOptions& options,
                                  Threads threads, const Progress& progress);
 
@@ -165,6 +244,8 @@ Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOpt
   LoadOptions taken_over = options;
   taken_over.keep_source = false;
   taken_over.sky_image = false;  // the environment is not taken over
+  taken_over.packs.clear();      // ScenePacks gives types their looks
+  taken_over.pack_zips.clear();
   if (detected->format == FileFormat::Scene) {
     auto file = parse_opened(*detected, threads);
     if (!file) return file.error();
@@ -183,7 +264,7 @@ using Bodies = std::map<std::string, Body, std::less<>>;
 
 /// Reads the files that the scene file `path` references.
 Result<Bodies> read_sources(const std::vector<SceneFile::Source>& sources, const std::filesystem::path& path,
-                            const LoadOptions& options, Threads threads, LoadedScene& loaded,
+                            const LoadOptions& options, Threads threads, ScenePacks& packs, LoadedScene& loaded,
                             const Progress& progress) {
   Bodies bodies;
   for (const SceneFile::Source& source : sources) {
@@ -199,6 +280,7 @@ Result<Bodies> read_sources(const std::vector<SceneFile::Source>& sources, const
       return error;
     }
     for (const std::string& warning : part->warnings) loaded.warnings.push_back(source.file + ": " + warning);
+    if (Status applied = packs.apply(source, part->scene.types, loaded); !applied) return applied.error();
     auto body = take_over(part->scene, loaded.scene);
     if (!body) return body.error();
     bodies.emplace(source.id, std::move(*body));
@@ -300,8 +382,11 @@ Result<LoadedScene> put_together(SceneFile& file, const std::filesystem::path& p
                                  Threads threads, const Progress& progress) {
   std::vector<GridHandle> grids;
   LoadedScene loaded = begin_scene(file, grids);
-  const auto bodies = read_sources(file.sources, path, options, threads, loaded, progress);
+  ScenePacks packs(path, options);
+  if (Status applied = packs.apply(loaded.scene.types); !applied) return applied.error();
+  const auto bodies = read_sources(file.sources, path, options, threads, packs, loaded, progress);
   if (!bodies) return bodies.error();
+  packs.report(loaded);
   Placer(file, grids, *bodies, loaded.scene).place();
   if (std::optional<Environment>& environment = loaded.scene.environment) {
     std::string warning = scene_json::read_sky_image(path, options, environment->sky);
@@ -336,9 +421,26 @@ std::vector<std::filesystem::path> files_named_in_scene(const DetectedFile& from
   const auto add = [&](const std::string& name) {
     if (auto found = sidecar_path(from.path, name, allowed)) named.push_back(std::move(*found));
   };
-  for (const SceneFile::Source& source : file->sources) add(source.file);
+  for (const SceneFile::Source& source : file->sources) {
+    add(source.file);
+    for (const SceneFile::Pack& pack : source.packs) {
+      if (pack.file != kBuiltinPack) add(pack.file);
+    }
+  }
   if (file->environment && lacks_image(file->environment->sky)) add(file->environment->sky.image_file);
   return named;
+}
+
+Result<SceneFile::Pack> scene_pack_of(const std::filesystem::path& pack, const std::filesystem::path& scene_path) {
+  auto hash = hash_of_pack(pack);
+  if (!hash) return hash.error();
+  std::error_code failed;
+  const std::filesystem::path whole = std::filesystem::canonical(pack, failed);
+  if (failed) return make_error(ErrorCode::CannotRead, failed.message(), pack.string());
+  std::filesystem::path folder = std::filesystem::absolute(scene_path, failed).parent_path();
+  if (!failed) folder = std::filesystem::weakly_canonical(folder, failed);
+  const std::filesystem::path relative = failed ? std::filesystem::path() : whole.lexically_relative(folder);
+  return SceneFile::Pack{(relative.empty() ? whole : relative).generic_string(), std::move(*hash)};
 }
 
 extern constinit const FormatDriver kSceneFormat = {
@@ -347,6 +449,7 @@ extern constinit const FormatDriver kSceneFormat = {
                  FormatCapability::Environment | FormatCapability::Camera},
     .detect = is_scene_file,
     .read = read_scene_file,
+    .applies_packs = true,
     .sidecar_files = files_named_in_scene,
     .write = [](const FormatOutput& output, const std::filesystem::path& path) -> Result<SavedScene> {
       auto file = scene_file_of(output.scene);

@@ -222,15 +222,39 @@ constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
 constexpr int kMaxDepth = 32;
 constexpr std::size_t kMaxFiles = 65'536;
 constexpr std::size_t kMaxInstances = std::size_t{1} << 22;
-constexpr int kVersion = 9;
+constexpr int kVersion = 10;
+constexpr std::size_t kMaxPacks = 64;  // of a file
+
+/// Reads the key "path", which names a file.
+void read_path(const Object& object, std::string& path) {
+  if (object.need("path") != nullptr) object.read("path", path);
+  if (path.empty() || path.find('\0') != std::string::npos) {
+    object.faults().add(object.place_of("path"), "must name a file");
+  }
+}
+
+SceneFile::Pack pack_of(const Json& json, const Place& place, Faults& faults) {
+  constexpr std::size_t kDigits = 16;
+  const Object object(json, place, {"path", "hash"}, faults);
+  SceneFile::Pack pack;
+  read_path(object, pack.file);
+  object.read("hash", pack.hash);
+  const bool is_hash =
+      pack.hash.size() == kDigits && pack.hash.find_first_not_of("0123456789abcdef") == std::string::npos;
+  if (object.find("hash") != nullptr && !is_hash) {
+    faults.add(object.place_of("hash"), "must be 16 hexadecimal digits in lower case");
+  }
+  return pack;
+}
 
 SceneFile::Source source_of(const Json& json, const Place& place, Faults& faults) {
-  const Object object(json, place, {"id", "path"}, faults);
+  const Object object(json, place, {"id", "path", "packs"}, faults);
   SceneFile::Source source;
   if (object.need("id") != nullptr) object.read("id", source.id);
-  if (object.need("path") != nullptr) object.read("path", source.file);
-  if (source.file.empty() || source.file.find('\0') != std::string::npos) {
-    faults.add(object.place_of("path"), "must name a file");
+  read_path(object, source.file);
+  if (object.find("packs") != nullptr) {
+    read_list(object, "packs", kMaxPacks,
+              [&](const Json& each, const Place& at) { source.packs.push_back(pack_of(each, at, faults)); });
   }
   return source;
 }
@@ -295,7 +319,7 @@ void read_file_object(const Json& json, std::size_t file_bytes, Threads threads,
   if (version != nullptr && !version->is_number_unsigned())
     faults.add(file.place_of("quoin_scene"), "must be the version, a whole number");
   if (version != nullptr && version->is_number_unsigned() && (*version < 1 || *version > kVersion)) {
-    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not supported (1 to 9 are)",
+    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not supported (1 to 10 are)",
                ErrorCode::Unsupported);
   }
   scene.types = read_types(file);

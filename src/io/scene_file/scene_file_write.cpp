@@ -72,6 +72,16 @@ class SceneText {
     grids_.push_back(std::move(json));
   }
 
+  [[nodiscard]] static OrderedJson json_of(const SceneFile::Source& source) {
+    OrderedJson json = {{"id", source.id}, {"path", source.file}};
+    for (const SceneFile::Pack& pack : source.packs) {
+      OrderedJson entry = {{"path", pack.file}};
+      if (!pack.hash.empty()) entry["hash"] = pack.hash;
+      json["packs"].push_back(std::move(entry));
+    }
+    return json;
+  }
+
   // One entry per line, so that people can search the file.
   void put_list(std::string& text, const char* key, const std::vector<OrderedJson>& entries) const {
     text.append(",\n  \"").append(key).append("\": [");
@@ -86,7 +96,9 @@ class SceneText {
     const bool has_models = !types_.empty() || !grids_.empty();
     const bool is_fourth = !layers_.empty() || !groups_.empty();
     std::string text = "{\n  \"quoin_scene\": ";
-    text += is_ninth_                                                ? "9"
+    const bool is_tenth = std::ranges::any_of(scene.sources, [](const auto& source) { return !source.packs.empty(); });
+    text += is_tenth                                                 ? "10"
+            : is_ninth_                                              ? "9"
             : is_eighth_                                             ? "8"
             : is_seventh_                                            ? "7"
             : is_sixth_                                              ? "6"
@@ -99,7 +111,7 @@ class SceneText {
     if (has_models) put_list(text, "grids", grids_);
     std::vector<OrderedJson> files;
     files.reserve(scene.sources.size());
-    for (const SceneFile::Source& source : scene.sources) files.push_back({{"id", source.id}, {"path", source.file}});
+    for (const SceneFile::Source& source : scene.sources) files.push_back(json_of(source));
     if (!has_models || !files.empty()) put_list(text, "files", files);
     if (!layers_.empty()) put_list(text, "layers", layers_);
     if (!groups_.empty()) put_list(text, "groups", groups_);
