@@ -548,7 +548,16 @@ class Program {
     options.raw_scalar = options.radius % 10;
     options.heights = options.radius % 4;
     options.metres_per_pixel = options.voxel_size;
-    if (options.size == sizeof options && options.frame % 2 != 0) options.dimension = "nether";
+    const char* const pack = "builtin";
+    const void* const zip = next_ - size;
+    if (options.size == sizeof options) {
+      if (options.frame % 2 != 0) options.dimension = "nether";
+      options.packs = &pack;
+      options.pack_count = options.frame % 3 == 1 ? 1 : 0;
+      options.pack_zips = &zip;
+      options.pack_zip_bytes = &size;
+      options.pack_zip_count = options.radius % 3 == 1 ? 1 : 0;
+    }
     took(quoin_scene_load_bytes_with(is_null ? nullptr : next_ - size, size, &options, &scene), &scene);
   }
 

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -612,6 +614,149 @@ TEST_F(CTextures, ReportErrorsForInvalidArguments) {
   quoin_mesh mesh = 0;
   EXPECT_EQ(quoin_grid_mesh(scene_, 0, &options, &mesh), QUOIN_BAD_HANDLE);
   EXPECT_EQ(quoin_free(made), QUOIN_OK);
+}
+
+/// Returns a zip file of a folder's files, without compression.
+std::vector<unsigned char> zip_of_folder(const std::filesystem::path& folder) {
+  std::vector<unsigned char> zip;
+  std::vector<unsigned char> directory;
+  unsigned count = 0;
+  const auto put = [](std::vector<unsigned char>& to, std::uint32_t number, int bytes) {
+    for (int i = 0; i < bytes; ++i) to.push_back(static_cast<unsigned char>(number >> 8 * i));
+  };
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (!entry.is_regular_file()) continue;
+    std::ifstream file(entry.path(), std::ios::binary);
+    const std::string text(std::istreambuf_iterator<char>(file), {});
+    const std::string name = entry.path().lexically_relative(folder).generic_string();
+    std::uint32_t crc = ~0U;
+    for (const char c : text) {
+      crc ^= static_cast<unsigned char>(c);
+      for (int bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ (crc % 2 == 0 ? 0U : 0xEDB88320U);
+    }
+    const auto at = static_cast<std::uint32_t>(zip.size());
+    // Version, flags, method and time; sums and sizes; lengths of the name and of extra fields.
+    const auto put_header = [&](std::vector<unsigned char>& to) {
+      for (const std::uint32_t number : {20U, 0U, 0U, 0U, 0U}) put(to, number, 2);
+      put(to, ~crc, 4);
+      for (int i = 0; i < 2; ++i) put(to, static_cast<std::uint32_t>(text.size()), 4);
+      put(to, static_cast<std::uint32_t>(name.size()), 2);
+      put(to, 0, 2);
+    };
+    put(zip, 0x04034B50, 4);
+    put_header(zip);
+    zip.insert(zip.end(), name.begin(), name.end());
+    zip.insert(zip.end(), text.begin(), text.end());
+    put(directory, 0x02014B50, 4);
+    put(directory, 20, 2);
+    put_header(directory);
+    for (int i = 0; i < 5; ++i) put(directory, 0, 2);
+    put(directory, at, 4);
+    directory.insert(directory.end(), name.begin(), name.end());
+    ++count;
+  }
+  const auto at = static_cast<std::uint32_t>(zip.size());
+  zip.insert(zip.end(), directory.begin(), directory.end());
+  put(zip, 0x06054B50, 4);
+  put(zip, 0, 4);
+  for (int i = 0; i < 2; ++i) put(zip, count, 2);
+  put(zip, static_cast<std::uint32_t>(directory.size()), 4);
+  put(zip, at, 4);
+  put(zip, 0, 2);
+  return zip;
+}
+
+/// Writes a resource pack, a folder, whose stone is a box of that height, in sixteenths.
+std::string write_stone_pack(const std::string& name, int height) {
+  namespace fs = std::filesystem;
+  const fs::path pack = fs::path(test_file(name));
+  fs::create_directories(pack / "assets/minecraft/blockstates");
+  fs::create_directories(pack / "assets/minecraft/models/block");
+  std::ofstream(pack / "assets/minecraft/blockstates/stone.json") << R"({"variants": {"": {"model": "block/stone"}}})";
+  std::ofstream(pack / "assets/minecraft/models/block/stone.json")
+      << R"({"elements": [{"from": [0, 0, 0], "to": [16, )" << height << R"(, 16], "faces": {
+           "down": {"texture": "#a"}, "up": {"texture": "#a"}, "north": {"texture": "#a"}, "south": {"texture": "#a"},
+           "west": {"texture": "#a"}, "east": {"texture": "#a"}}}]})";
+  return pack.string();
+}
+
+TEST(C, PacksGiveBlocksTheirLooks) {
+  quoin_scene scene = 0;
+  ASSERT_EQ(quoin_scene_create(&scene), QUOIN_OK);
+  auto type = sized<quoin_type>();
+  type.rgba[3] = 255;
+  type.roughness = 1.0F;
+  std::strcpy(type.name, "minecraft:stone");
+  std::uint16_t number = 0;
+  ASSERT_EQ(quoin_type_add(scene, &type, &number), QUOIN_OK);
+  const std::vector<std::uint16_t> voxels = {1};
+  const quoin_array array = array_of(voxels, QUOIN_UINT16, 1);
+  ASSERT_EQ(quoin_grid_add(scene, &array, "", nullptr), QUOIN_OK);
+  const std::string house = test_file("house.schem");
+  ASSERT_EQ(quoin_scene_save(scene, house.c_str()), QUOIN_OK) << quoin_last_error();
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+
+  auto options = sized<quoin_load_options>();
+  // Returns the height of the stone; 0 if it cannot be loaded.
+  const auto height = [&] {
+    if (quoin_scene_load_with(house.c_str(), &options, &scene) != QUOIN_OK) return 0.0F;
+    quoin_mesh mesh = 0;
+    auto data = sized<quoin_mesh_data>();
+    EXPECT_EQ(quoin_grid_mesh(scene, 0, nullptr, &mesh), QUOIN_OK);
+    EXPECT_EQ(quoin_mesh_view(mesh, &data), QUOIN_OK);
+    float top = 0.0F;
+    for (std::size_t i = 0; i < data.vertex_count; ++i) top = std::max(top, data.positions[3 * i + 1]);
+    EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
+    EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+    return top;
+  };
+  const std::string half = write_stone_pack("half", 8);
+  const std::string quarter = write_stone_pack("quarter", 4);
+  std::vector<const char*> packs = {half.c_str(), quarter.c_str(), "builtin"};
+  EXPECT_EQ(height(), 1.0F);
+  options.packs = packs.data();
+  EXPECT_EQ(height(), 1.0F) << "none of them";
+  options.pack_count = 1;
+  EXPECT_EQ(height(), 0.5F);
+  options.pack_count = 3;
+  EXPECT_EQ(height(), 0.25F);
+  // A program compiled with an older header has no such fields.
+  options.size = offsetof(quoin_load_options, packs);
+  EXPECT_EQ(height(), 1.0F);
+  options = sized<quoin_load_options>();
+  options.pack_count = 1;
+  EXPECT_EQ(height(), 0.0F) << "packs is null";
+  options.packs = packs.data();
+  packs[0] = nullptr;
+  EXPECT_EQ(height(), 0.0F);
+  packs[0] = "";
+  EXPECT_EQ(height(), 0.0F);
+  options.pack_count = 1'025;
+  EXPECT_EQ(height(), 0.0F);
+  const std::string absent = test_file("absent.zip");
+  packs[0] = absent.c_str();
+  options.pack_count = 1;
+  EXPECT_EQ(height(), 0.0F);
+  EXPECT_NE(std::string(quoin_last_error()).find("absent.zip"), std::string::npos) << quoin_last_error();
+
+  // The bytes of a zip file that has the pack's files without compression.
+  std::vector<unsigned char> zip = zip_of_folder(test_file("quarter"));
+  const void* bytes = zip.data();
+  std::size_t size = zip.size();
+  packs[0] = half.c_str();
+  options.pack_zips = &bytes;
+  options.pack_zip_bytes = &size;
+  options.pack_zip_count = 1;
+  EXPECT_EQ(height(), 0.25F) << quoin_last_error();
+  options.pack_count = 0;
+  EXPECT_EQ(height(), 0.25F) << quoin_last_error();
+  size -= 30;
+  EXPECT_EQ(height(), 0.0F) << "cut off";
+  options.pack_zip_bytes = nullptr;
+  EXPECT_EQ(height(), 0.0F);
+  options.pack_zip_bytes = &size;
+  bytes = nullptr;
+  EXPECT_EQ(height(), 0.0F);
 }
 
 TEST(C, ReportsErrorsForInvalidArguments) {

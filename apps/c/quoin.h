@@ -401,6 +401,17 @@ typedef struct quoin_load_options {
   /* For Minecraft worlds: "overworld", "nether", "end" or "NAMESPACE:NAME". Null or "": the overworld, or the first
    * dimension if there is none. Other files ignore it. */
   const char* dimension;
+  /* Resource packs of Minecraft for the shapes and textures of its blocks, the lowest first; at most 1,024. Paths of
+   * folders, zip files or .jar files, UTF-8; "builtin" is Quoin's own pack, which gives a look to blocks that the other
+   * packs lack. A pack that cannot be read is an error. */
+  const char* const* packs;
+  size_t pack_count;
+  /* The bytes of more packs (zip files), above `packs`; at most 1,024. They are copied. */
+  const void* const* pack_zips;
+  const size_t* pack_zip_bytes;
+  size_t pack_zip_count;
+  /* 1: does not use the packs that a scene file names for its files. */
+  int32_t ignore_scene_packs;
 } quoin_load_options;
 
 typedef enum quoin_fill {

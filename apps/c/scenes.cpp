@@ -243,6 +243,12 @@ LoadOptions options_of(const quoin_load_options& given) {
   if (given.heights != QUOIN_HEIGHTS_NONE) options.heights = heights_of(given);
   if (given.allow_outside_files != 0) options.sidecar_files = SidecarFiles::Anywhere;
   if (given.dimension != nullptr) options.dimension = given.dimension;
+  for (std::size_t i = 0; i < given.pack_count; ++i) options.packs.emplace_back(given.packs[i]);
+  for (std::size_t i = 0; i < given.pack_zip_count; ++i) {
+    const auto* const first = static_cast<const std::byte*>(given.pack_zips[i]);
+    options.pack_zips.emplace_back(first, first + given.pack_zip_bytes[i]);
+  }
+  options.scene_packs = given.ignore_scene_packs == 0;
   return options;
 }
 
@@ -262,6 +268,21 @@ const char* validate_heights(const quoin_load_options& options) {
              : nullptr;
 }
 
+const char* validate_packs(const quoin_load_options& options) {
+  constexpr std::size_t kMost = 1'024;
+  if (options.pack_count > kMost || options.pack_zip_count > kMost) return "more than 1,024 packs";
+  if (options.pack_count > 0 && options.packs == nullptr) return "packs is null";
+  for (std::size_t i = 0; i < options.pack_count; ++i) {
+    if (options.packs[i] == nullptr || *options.packs[i] == '\0') return "the path of a pack is null or empty";
+  }
+  if (options.pack_zip_count > 0 && (options.pack_zips == nullptr || options.pack_zip_bytes == nullptr))
+    return "pack_zips or pack_zip_bytes is null";
+  for (std::size_t i = 0; i < options.pack_zip_count; ++i) {
+    if (options.pack_zips[i] == nullptr && options.pack_zip_bytes[i] > 0) return "the bytes of a pack are null";
+  }
+  return nullptr;
+}
+
 const char* validate_load_options(const quoin_load_options& options) {
   if (options.frame < 0 || options.radius < 0 || options.radius > 1'024) return "frame or radius is out of range";
   if (options.has_iso != 0 && !std::isfinite(options.iso)) return "iso is not finite";
@@ -270,6 +291,7 @@ const char* validate_load_options(const quoin_load_options& options) {
   if (options.mesh_voxels != 0 && options.voxel_size != 0.0) return "both mesh_voxels and voxel_size are set";
   if (options.raw_scalar < QUOIN_UINT8 || options.raw_scalar > QUOIN_FLOAT64) return "no scalar has this number";
   if (is_raw(options) && options.heights != QUOIN_HEIGHTS_NONE) return "both raw_shape and heights are set";
+  if (const char* const fault = validate_packs(options)) return fault;
   return validate_heights(options);
 }
 

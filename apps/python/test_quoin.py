@@ -8,6 +8,7 @@ import gc
 import io
 import json
 import os
+import pathlib
 import pickle
 import re
 import shutil
@@ -16,6 +17,7 @@ import tempfile
 import threading
 import time
 import unittest
+import zipfile
 
 try:
     import numpy as np
@@ -444,6 +446,66 @@ class Scenes(unittest.TestCase):
             self.assertEqual(voxels, {None: 8192, "": 8192, "minecraft:overworld": 8192, "nether": 8704})
             with self.assertRaisesRegex(quoin.QuoinError, "the world has minecraft:overworld, minecraft:the_nether"):
                 quoin.load(copied, dimension="end")
+
+    def test_packs_give_blocks_their_looks(self):
+        def pack(height):
+            """The files of a pack whose stone is a box of that height, in sixteenths."""
+            faces = {side: {"texture": "#all"} for side in ("down", "up", "north", "south", "west", "east")}
+            model = {"elements": [{"from": [0, 0, 0], "to": [16, height, 16], "faces": faces}]}
+            return {"assets/minecraft/blockstates/stone.json": {"variants": {"": {"model": "block/stone"}}},
+                    "assets/minecraft/models/block/stone.json": model}
+
+        def zipped(files):
+            held = io.BytesIO()
+            with zipfile.ZipFile(held, "w") as archive:
+                for name, content in files.items():
+                    archive.writestr(name, json.dumps(content))
+            return held.getvalue()
+
+        def top(loaded):
+            return float(loaded.grids[0].mesh().positions[:, 1].max())
+
+        with tempfile.TemporaryDirectory() as folder:
+            scene = quoin.Scene()
+            scene.add_type(quoin.VoxelType((120, 120, 120), "minecraft:stone"))
+            scene.add(np.ones((1, 1, 1), np.uint8))
+            house = f"{folder}/house.schem"
+            scene.save(house)
+            for name, content in pack(8).items():
+                os.makedirs(os.path.dirname(f"{folder}/half/{name}"), exist_ok=True)
+                with open(f"{folder}/half/{name}", "w") as file:
+                    json.dump(content, file)
+            with open(f"{folder}/quarter.zip", "wb") as file:
+                file.write(zipped(pack(4)))
+            half, quarter, eighth = f"{folder}/half", pathlib.Path(folder, "quarter.zip"), zipped(pack(2))
+            self.assertEqual(top(quoin.load(house)), 1.0)
+            self.assertEqual(top(quoin.load(house, packs=[half])), 0.5)
+            self.assertEqual(top(quoin.load(house, packs=[half, quarter])), 0.25)
+            self.assertEqual(top(quoin.load(house, packs=(half, quarter, bytearray(eighth)))), 0.125)
+            built_in = quoin.load(house, packs=["builtin"])
+            self.assertEqual((top(built_in), len(built_in.textures().faces(1))), (1.0, 6))
+            with open(house, "rb") as file:
+                held = file.read()
+            self.assertEqual(top(quoin.load_bytes(held, packs=[memoryview(eighth)])), 0.125)
+            # A scene file that names a pack.
+            for name, count in (("quarter.zip", 0), ("absent.zip", 1)):
+                with open(f"{folder}/scene.json", "w") as file:
+                    json.dump({"quoin_scene": 10, "instances": [{"file": "a"}],
+                               "files": [{"id": "a", "path": "house.schem", "packs": [{"path": name}]}]}, file)
+                loaded = quoin.load(f"{folder}/scene.json")
+                self.assertEqual((top(loaded), len([one for one in loaded.warnings if "absent.zip" in one])),
+                                 (1.0 if count else 0.25, count))
+                self.assertEqual(quoin.load(f"{folder}/scene.json", scene_packs=False).warnings, [])
+            with self.assertRaisesRegex(quoin.QuoinError, "absent.zip: No such file"):
+                quoin.load(house, packs=[f"{folder}/absent.zip"])
+            with self.assertRaisesRegex(quoin.QuoinError, "not a resource pack"):
+                quoin.load(house, packs=[b"no zip"])
+            with self.assertRaisesRegex(quoin.QuoinError, "empty"):
+                quoin.load(house, packs=[""])
+            for wrong, error in (("half.zip", TypeError), ([3], TypeError), ([None], TypeError), (["a\0b"], ValueError),
+                                 ([eighth, half], ValueError), (eighth, TypeError)):
+                with self.assertRaises(error, msg=repr(wrong)[:40]):
+                    quoin.load(house, packs=wrong)
 
     def test_surfaces_have_no_points_where_values_equal_iso(self):
         x, y, z = np.indices((24, 24, 24)) - 11.5

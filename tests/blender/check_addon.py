@@ -5,6 +5,7 @@ with BLENDER_USER_CONFIG and BLENDER_USER_SCRIPTS in an empty folder. Output goe
 Exit status: 0 all right, 1 not.
 """
 
+import json
 import math
 import os
 import sys
@@ -752,6 +753,38 @@ def check_shapes(quoin, folder):
         require(read.textures().shapes(1).parts[0].elements[0].looks["+Y"] == (10, 200, 30), "the slab's colour")
 
 
+def check_packs(quoin, folder):
+    """Resource packs give imported blocks their shapes and textures, and an export keeps them."""
+    faces = {side: {"texture": "#all"} for side in ("down", "up", "north", "south", "west", "east")}
+    for name, height in (("half", 8), ("quarter", 4)):
+        model = {"elements": [{"from": [0, 0, 0], "to": [16, height, 16], "faces": faces}]}
+        for path, content in (("blockstates", {"variants": {"": {"model": "block/stone"}}}), ("models/block", model)):
+            where = os.path.join(folder, name, "assets", "minecraft", *path.split("/"))
+            os.makedirs(where, exist_ok=True)
+            with open(os.path.join(where, "stone.json"), "w") as file:
+                json.dump(content, file)
+    scene = quoin.Scene()
+    scene.add_type(quoin.VoxelType((120, 120, 120), "minecraft:stone"))
+    scene.add(np.ones((1, 1, 1), np.uint8))
+    house = os.path.join(folder, "house.schem")
+    scene.save(house)
+    half, quarter = os.path.join(folder, "half"), os.path.join(folder, "quarter")
+    for packs, height, images in (("", 1.0, 0), (half, 0.5, 0), (f"{half}; {quarter};", 0.25, 0), ("builtin", 1.0, 1)):
+        empty()
+        run(bpy.ops.import_scene.quoin, filepath=house, scale=1.0, packs=packs)
+        mesh = next(one.data for one in bpy.data.objects if one.type == "MESH")
+        top = max(one.co.z for one in mesh.vertices)
+        require(abs(top - height) < 1e-3, f"packs {packs!r}: the stone is {top} high, not {height}")
+        used = {node.image for material in mesh.materials for node in material.node_tree.nodes
+                if node.type == "TEX_IMAGE"}
+        require((len(used) > 0) == (images > 0), f"packs {packs!r}: {len(used)} images")
+    path = os.path.join(folder, "house.json")
+    run(bpy.ops.export_scene.quoin, filepath=path, scale=1.0)
+    again = quoin.load(path)
+    require(any(again.textures().faces(i) for i in range(len(again.types))), "the export has no textures")
+    refused(bpy.ops.import_scene.quoin, "absent.zip", filepath=house, packs=os.path.join(folder, "absent.zip"))
+
+
 def main():
     addon, castle, folder = sys.argv[sys.argv.index("--") + 1 :]
     bpy.ops.preferences.addon_install(filepath=addon)
@@ -786,6 +819,7 @@ def main():
     check_colours(quoin, folder)
     check_textures(quoin, folder)
     check_shapes(quoin, folder)
+    check_packs(quoin, folder)
     check_refusals(folder)
     check_surfaces(castle)
     empty()

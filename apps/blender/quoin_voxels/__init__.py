@@ -94,6 +94,9 @@ class QUOIN_OT_import(bpy.types.Operator, ImportHelper):
     set_iso: BoolProperty(name="Threshold", default=False, description="Volumes: set the threshold. Default: "
                           "a threshold between the two groups of values")
     iso: FloatProperty(name="Value", default=0.0, description="Volumes: values above it are solid")
+    packs: StringProperty(name="Resource Packs", default="", description="Blocks of Minecraft: packs for their shapes "
+                          "and textures: folders, zip files or client .jar files, separated by ;, the last one on top. "
+                          "builtin is Quoin's own pack, for blocks that the others lack")
 
     def draw(self, context):
         layout = self.layout
@@ -102,7 +105,7 @@ class QUOIN_OT_import(bpy.types.Operator, ImportHelper):
             layout.prop(self, name)
         box = layout.box()
         box.label(text="For some file types")
-        for name in ("frame", "radius", "size", "set_iso"):
+        for name in ("frame", "radius", "packs", "size", "set_iso"):
             box.prop(self, name)
         row = box.row()
         row.enabled = self.set_iso

@@ -413,10 +413,17 @@ def _place(scene, top, name, looks, options, made, progress):
         made.warnings.append(f"{name}: {unplaced} grids without instances are left out")
 
 
+def packs_of(text):
+    """Returns the resource packs that the user names, the lowest first. A path with // is relative to the .blend."""
+    named = [one.strip() for one in text.split(";")]
+    return [os.path.expanduser(bpy.path.abspath(one)) for one in named if one]
+
+
 def import_file(context, path, options):
     """Imports a file into a new collection. `options` is the import operator."""
     scene = quoin.load(path, frame=options.frame, show_hidden=options.show_hidden, radius=options.radius,
-                       iso=options.iso if options.set_iso else None, size=options.size)
+                       iso=options.iso if options.set_iso else None, size=options.size,
+                       packs=packs_of(options.packs))
     made = Imported()
     name = os.path.splitext(os.path.basename(os.path.normpath(path)))[0]
     made.warnings += [f"{name}: {line}" for line in scene.warnings]

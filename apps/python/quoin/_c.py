@@ -173,7 +173,10 @@ class LoadOptions(ctypes.Structure):
                 ("heights", ctypes.c_int32), ("metres_per_level", ctypes.c_double),
                 ("metres_per_pixel", ctypes.c_double), ("metres_per_voxel", ctypes.c_double),
                 ("exaggeration", ctypes.c_double), ("ground_depth", ctypes.c_int32), ("smooth_ground", ctypes.c_int32),
-                ("allow_outside_files", ctypes.c_int32), ("dimension", ctypes.c_char_p)]
+                ("allow_outside_files", ctypes.c_int32), ("dimension", ctypes.c_char_p),
+                ("packs", ctypes.POINTER(ctypes.c_char_p)), ("pack_count", ctypes.c_size_t),
+                ("pack_zips", ctypes.POINTER(ctypes.c_void_p)), ("pack_zip_bytes", ctypes.POINTER(ctypes.c_size_t)),
+                ("pack_zip_count", ctypes.c_size_t), ("ignore_scene_packs", ctypes.c_int32)]
 
 
 class Triangles(ctypes.Structure):

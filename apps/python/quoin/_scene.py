@@ -15,6 +15,7 @@ from ._textures import (DIRECTIONS, Element, Face, Orientations, Shapes, Texture
                         shapes_struct)
 
 Path = Union[str, "os.PathLike[str]"]
+Packs = Iterable[Union[Path, bytes, bytearray, memoryview]]
 Colour = Sequence[int]
 _FILLS = {"all": 0, "solid": 1, "surface": 2}
 
@@ -1010,10 +1011,35 @@ def _load_options(frame: int, show_hidden: bool, radius: int, iso: Optional[floa
     return options
 
 
+def _bytes_of(data: Union[bytes, bytearray, memoryview]) -> NdArray:
+    """Returns the bytes of a contiguous buffer, in place. Raises TypeError for other objects."""
+    held = memoryview(data).cast("B")
+    return np.frombuffer(held, np.uint8) if held.nbytes else np.zeros(0, np.uint8)
+
+
+def _add_packs(options: Any, packs: Packs, scene_packs: bool) -> List[NdArray]:
+    """Sets resource packs. The options hold the paths; the caller must keep the result until the call is over."""
+    if isinstance(packs, (str, bytes, bytearray, memoryview, os.PathLike)):
+        raise TypeError("packs must be a list of packs")
+    paths, zips = [], []
+    for one in packs:
+        if isinstance(one, (bytes, bytearray, memoryview)):
+            zips.append(_bytes_of(one))
+        elif zips:
+            raise ValueError("packs from bytes are above packs from files: list them last")
+        else:
+            paths.append(_c.path_of(one))
+    options.packs, options.pack_count = (ctypes.c_char_p * len(paths))(*paths), len(paths)
+    options.pack_zips = (ctypes.c_void_p * len(zips))(*(one.ctypes.data for one in zips))
+    options.pack_zip_bytes = (ctypes.c_size_t * len(zips))(*(one.size for one in zips))
+    options.pack_zip_count, options.ignore_scene_packs = len(zips), int(not scene_packs)
+    return zips
+
+
 def load(path: Path, *, frame: int = 0, show_hidden: bool = False, radius: int = 0, iso: Optional[float] = None,
          size: int = 0, voxel_size: float = 0.0, threads: int = 0, raw: Optional[Raw] = None,
          heights: Optional[Heights] = None, allow_outside_files: bool = False,
-         dimension: Optional[str] = None) -> Scene:
+         dimension: Optional[str] = None, packs: Packs = (), scene_packs: bool = True) -> Scene:
     """Loads a file of any readable format (see `formats`), or the folder of a world.
 
     Any file: `frame`: animation frame. `show_hidden`: shows hidden instances, groups and layers. `raw`: reads the file
@@ -1023,12 +1049,16 @@ def load(path: Path, *, frame: int = 0, show_hidden: bool = False, radius: int =
     Worlds: `radius`: chunks of 64 voxels to load on each side of the spawn point; 0 means 4. `dimension` (Minecraft):
     "overworld", "nether", "end" or "NAMESPACE:NAME"; default: the overworld, or the first dimension if there is none.
 
+    Blocks of Minecraft: `packs`: resource packs for their shapes and textures, the lowest first: paths of folders, zip
+    files or client .jar files, and the bytes of zip files, which come last. "builtin" is Quoin's own pack, which gives
+    a look to blocks that the other packs lack. `scene_packs=False` does not use the packs that a scene file names.
+
     Volumes: `iso`: values above it are solid; default: a threshold between the two groups of values.
 
     Triangle files: `size`: voxels along the longest side; 0 means 128. `voxel_size`: edge length of a voxel, in the
     file's unit; replaces `size`.
 
-    Raises QuoinError if the file cannot be read.
+    Raises QuoinError if the file or a pack cannot be read, ValueError if a path follows the bytes of a pack.
 
     >>> load("nothing.vox")
     Traceback (most recent call last):
@@ -1038,14 +1068,16 @@ def load(path: Path, *, frame: int = 0, show_hidden: bool = False, radius: int =
     options = _load_options(frame, show_hidden, radius, iso, size, voxel_size, threads, raw, heights)
     options.allow_outside_files = int(allow_outside_files)
     options.dimension = None if dimension is None else _c.name_of(dimension)
+    held = _add_packs(options, packs, scene_packs)
     out = ctypes.c_uint64()
     _c.check(_c.lib.quoin_scene_load_with(_c.path_of(path), ctypes.byref(options), ctypes.byref(out)))
+    del held
     return Scene(_c.Owner(out.value))
 
 
 def load_bytes(data: Union[bytes, bytearray, memoryview], *, frame: int = 0, show_hidden: bool = False, radius: int = 0,
                iso: Optional[float] = None, size: int = 0, voxel_size: float = 0.0, threads: int = 0,
-               raw: Optional[Raw] = None, heights: Optional[Heights] = None) -> Scene:
+               raw: Optional[Raw] = None, heights: Optional[Heights] = None, packs: Packs = ()) -> Scene:
     """Loads the contents of a file from bytes or any contiguous buffer, which is read in place. Options: see `load`.
 
     Raises QuoinError if the contents cannot be read, and TypeError if `data` is not a buffer.
@@ -1055,10 +1087,11 @@ def load_bytes(data: Union[bytes, bytearray, memoryview], *, frame: int = 0, sho
     True
     """
     options = _load_options(frame, show_hidden, radius, iso, size, voxel_size, threads, raw, heights)
-    held = memoryview(data).cast("B")
-    array = np.frombuffer(held, np.uint8) if held.nbytes else np.zeros(0, np.uint8)
+    held = _add_packs(options, packs, True)
+    array = _bytes_of(data)
     out = ctypes.c_uint64()
     _c.check(_c.lib.quoin_scene_load_bytes_with(array.ctypes.data, array.size, ctypes.byref(options), ctypes.byref(out)))
+    del held
     return Scene(_c.Owner(out.value))
 
 

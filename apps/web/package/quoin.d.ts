@@ -197,6 +197,10 @@ export interface LoadOptions extends Progress, Small {
   voxelSize?: number;
   raw?: RawVolume;
   heights?: Heights;
+  /** Blocks of Minecraft: resource packs for their shapes and textures, the lowest first: the bytes of zip files or
+   *  client .jar files. 'builtin', at any place, is Quoin's own pack, which gives a look to blocks that the other packs
+   *  lack. */
+  packs?: (ArrayBuffer | ArrayBufferView | 'builtin')[];
 }
 
 /** Loads a file of any format. The content determines the format, unless `raw` or `heights` is given. With `small`,

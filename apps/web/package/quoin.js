@@ -590,12 +590,13 @@ function checkBytes(given) {
   }
 }
 
-const loadNames = ['showHidden', 'frame', 'radius', 'iso', 'meshVoxels', 'voxelSize', 'raw', 'heights', 'small',
-                   'progress'];
+const loadNames = ['showHidden', 'frame', 'radius', 'iso', 'meshVoxels', 'voxelSize', 'raw', 'heights', 'packs',
+                   'small', 'progress'];
 
 export async function load(bytes, options = {}) {
   checkBytes(bytes);
   known(options, loadNames);
+  checkPacks(options.packs ?? []);
   // The small module does not support raw values and height maps.
   if (options.small && options.raw === undefined && options.heights === undefined) {
     const scene = loaded(await small.alive(), bytes, options);
@@ -613,10 +614,40 @@ function loaded(of, bytes, { progress, ...options }) {
     if (of.isSmall && of.run('quoin_web_reads', at, bytes.byteLength) === 0) return undefined;
     const handle = of.listened(progress, () => of.withStruct('loadOptions', (wanted) => {
       putLoadOptions(of.view(), wanted, options);
-      return of.handle('quoin_scene_load_bytes_with', at, bytes.byteLength, wanted);
+      // The small module reads no files with blocks of Minecraft.
+      return withPacks(of, wanted, of.isSmall ? [] : options.packs ?? [],
+                       () => of.handle('quoin_scene_load_bytes_with', at, bytes.byteLength, wanted));
     }));
     return new Scene(of, handle);
   });
+}
+
+const ownPack = 'builtin';
+
+function checkPacks(packs) {
+  if (!Array.isArray(packs))
+    throw new QuoinError('invalid_argument', 'packs must be a list of ArrayBuffers, typed arrays or "builtin"');
+  for (const pack of packs) {
+    if (pack !== ownPack) checkBytes(pack);
+  }
+}
+
+/** Copies packs to memory, and sets them in the quoin_load_options at an address, for the time of use(). */
+function withPacks(of, wanted, packs, use) {
+  const zips = packs.filter((pack) => pack !== ownPack);
+  const putFrom = (i, addresses) => {
+    if (i < zips.length) return of.withBytes(zips[i], (zip) => putFrom(i + 1, [...addresses, zip]));
+    const lists = Uint32Array.of(...addresses, ...zips.map(({ byteLength }) => byteLength));
+    const put = (zipLists, paths) => {
+      const view = of.view();
+      [paths, zips.length < packs.length ? 1 : 0, zipLists, zipLists + 4 * zips.length, zips.length].forEach(
+        (value, i) => view.setUint32(wanted + 112 + 4 * i, value, true));
+      return use();
+    };
+    return of.withBytes(lists, (zipLists) => of.withText(ownPack, (own) =>
+      of.withBytes(Uint32Array.of(own), (paths) => put(zipLists, paths))));
+  };
+  return packs.length === 0 ? use() : putFrom(0, []);
 }
 
 const scalarNames = ['uint8', 'int8', 'uint16', 'int16', 'uint32', 'int32', 'uint64', 'int64', 'float32', 'float64'];

@@ -28,6 +28,7 @@ tape.visible = false;
 stage.add(sky, sun, sun.target, tape);
 
 let file;      // { name, bytes, heights }
+let packs = [];  // resource packs for blocks of Minecraft: { name, bytes }, the lowest first
 let model;     // the displayed model
 let plain;     // the same with plain materials, for software renderers
 let glb;       // its bytes
@@ -68,7 +69,8 @@ function newWorker() {
     for (const { reject } of jobs.values()) reject(new Error(text));
     jobs = new Map();
   };
-  if (file) ask('keep', { bytes: file.bytes, heights: file.heights }).catch(() => {});  // `load` reports the error
+  // `load` reports the error.
+  if (file) ask('keep', { bytes: file.bytes, heights: file.heights, packs: packsOf() }).catch(() => {});
 }
 
 /** `tell`: progress callback of long tasks. */
@@ -299,27 +301,43 @@ async function heightsOf(name) {
   return { encoding: $('encoding').value, metresPerPixel: $('metres').valueAsNumber };
 }
 
+/** Returns the packs for `load`: the dropped ones with Quoin's own pack below, or none. */
+const packsOf = () => (packs.length === 0 ? [] : ['builtin', ...packs.map(({ bytes }) => bytes)]);
+
+/** Returns true if the file was opened and is shown. */
 async function open(name, bytes, isCurrent) {
   const heights = isPng(bytes) ? await heightsOf(name) : $('heights').close('');
-  if (!isCurrent()) return;
-  if (isPng(bytes) && heights === undefined) return say('');
+  if (!isCurrent()) return false;
+  if (isPng(bytes) && heights === undefined) {
+    say('');
+    return false;
+  }
+  return read({ name, bytes, heights }, isCurrent);
+}
+
+/** Reads a file and shows it. `keepsView`: it is shown already, and is read again. */
+async function read({ name, bytes, heights }, isCurrent, keepsView = false) {
   const began = performance.now();
   say(`Reading ${name} ...`);
   marched?.stop();
   if (jobs.size > 0 || worker.hasFailed) newWorker();
   try {
     const tell = (fraction) => say(`Reading ${name}: ${percent(fraction)} ...`);
-    const answer = await ask('load', { bytes, heights }, tell);
-    if (!await show(answer.glb.slice(), isCurrent)) return;
+    const answer = await ask('load', { bytes, heights, packs: packsOf() }, tell);
+    if (!await show(answer.glb.slice(), isCurrent)) return false;
     glb = answer.glb;
     file = { name, bytes, heights };
     describe(name, answer);
     resize();
-    home();
-    viewFromText(location.hash);
+    if (keepsView) {
+      placeSun();
+    } else {
+      home();
+      viewFromText(location.hash);
+    }
     drawSoon();
     await imageIsThere();
-    if (!isCurrent()) return;
+    if (!isCurrent()) return false;
     const total = performance.now() - began;
     if (isPressed('rays')) march();
     const { load, mesh } = answer.milliseconds;
@@ -327,13 +345,49 @@ async function open(name, bytes, isCurrent) {
       `${name}: read in ${load.toFixed(0)} ms, meshed in ${mesh.toFixed(0)} ms, on the screen in ${
         total.toFixed(0)} ms.`);
     window.quoinPage = { ...answer.milliseconds, total };
+    return true;
   } catch (error) {
-    if (!isCurrent()) return;
+    if (!isCurrent()) return false;
     $('rays').setAttribute('aria-pressed', 'false');
     $('marching').textContent = '';
     redraw();
     say(`${name}: ${error.message}`, true);
+    return false;
   }
+}
+
+// ---- Resource packs.
+const isPackName = (name) => /\.(zip|jar)$/i.test(name);
+
+/** Returns true if the packs can be read. */
+async function checkPacks() {
+  try {
+    await ask('check', { packs: packsOf() });
+    return true;
+  } catch (error) {
+    say(`${packs.at(-1)?.name}: ${error.message}`, true);
+    return false;
+  }
+}
+
+/** Uses other packs, and reads the current file again. If that fails, the packs stay as they were. */
+async function usePacks(wanted, isCurrent) {
+  const before = packs;
+  packs = wanted;
+  const hasBlocks = file !== undefined && file.heights === undefined;
+  const isUsed = await checkPacks() && (!hasBlocks || await read(file, isCurrent, true));
+  if (!isUsed && packs === wanted) packs = before;
+  $('packs').hidden = packs.length === 0;
+  $('packs').querySelector('span').textContent = packs.map(({ name }) => name).join(', ');
+  return isUsed;
+}
+
+/** Adds a pack above the others; a pack of the same name replaces the earlier one. */
+async function addPack(name, bytes, isCurrent) {
+  const isNew = (pack) => pack.name !== name;
+  if (await usePacks([...packs.filter(isNew), { name, bytes }], isCurrent) && isCurrent())
+    say(file === undefined ? `${name} gives blocks of Minecraft their shapes and textures. Now drop a file.` :
+      `${name} gives blocks of Minecraft their shapes and textures.`);
 }
 
 const isEmpty = ({ grids }) => grids.every((grid) => grid.voxels === 0 && !grid.hasField);
@@ -374,7 +428,7 @@ async function openFile(chosen) {
   const isCurrent = untilTheNext();
   try {
     const bytes = await chosen.arrayBuffer();
-    if (isCurrent()) await open(chosen.name, bytes, isCurrent);
+    if (isCurrent()) await (isPackName(chosen.name) ? addPack : open)(chosen.name, bytes, isCurrent);
   } catch (error) {
     say(`${chosen.name}: ${error.message}`, true);
   }
@@ -529,6 +583,10 @@ $('rays').addEventListener('click', () => {
   march();
 });
 $('home').addEventListener('click', home);
+$('no-packs').addEventListener('click', () => {
+  ++openings;
+  usePacks([], untilTheNext());
+});
 $('smooth').addEventListener('change', async () => {
   say('Meshing ...');
   const isCurrent = untilTheNext();

@@ -23,12 +23,13 @@ prepare().catch(() => {});  // `load` reports the error
 
 let file;     // the bytes of the current file
 let heights;  // its height encoding, if it is an image
+let packs;    // the resource packs for its blocks
 let scene;    // its scene; undefined if its instance has ended or a later file could not be read
 let shaders;  // its ShaderScene for WebGPU, from the whole module
 
 async function current() {
   if (file === undefined) throw new Error('no file is loaded');
-  scene ??= await load(file, { small: true, heights });
+  scene ??= await load(file, { small: true, heights, packs });
   return scene;
 }
 
@@ -36,7 +37,7 @@ async function current() {
 async function wholeScene() {
   const now = await current();
   if (!now.isSmall) return now;
-  const whole = await load(file, { heights });
+  const whole = await load(file, { heights, packs });
   now.free();
   scene = whole;
   return whole;
@@ -53,13 +54,19 @@ const samplesOfAPixel = 16;
 const work = {
   /** Receives the current file, if this worker replaces another. */
   async keep(kept) {
-    ({ bytes: file, heights } = kept);
+    ({ bytes: file, heights, packs } = kept);
     return {};
   },
-  async load({ bytes, smooth, heights: asHeights }, tell) {
+  /** Fails if the packs cannot be read. */
+  async check({ packs: given }) {
+    (await load(block(), { packs: given })).free();
+    return {};
+  },
+  async load({ bytes, smooth, heights: asHeights, packs: withPacks }, tell) {
     forget();
     const began = performance.now();
-    const made = await load(bytes, { small: true, heights: asHeights, progress: (fraction) => tell(fraction / 2) });
+    const made = await load(bytes, { small: true, heights: asHeights, packs: withPacks,
+                                     progress: (fraction) => tell(fraction / 2) });
     const loaded = performance.now();
     const progress = (fraction) => tell(0.5 + fraction / 2);
     let glb;
@@ -71,6 +78,7 @@ const work = {
     }
     file = bytes;
     heights = asHeights;
+    packs = withPacks;
     scene = made;
     return { glb, warnings: scene.warnings, grids: scene.grids, types: scene.types.length - 1,
              milliseconds: { load: loaded - began, mesh: performance.now() - loaded } };

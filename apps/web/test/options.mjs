@@ -6,6 +6,7 @@ import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { check, found, refusing } from './checks.mjs';
+import { oneVoxel, stonePack } from './packs.mjs';
 
 const [packageFolder, tool, corpus, three, castle] = process.argv.slice(2);
 const { load, toThree, QuoinError } = await import(pathToFileURL(join(packageFolder, 'quoin.js')));
@@ -94,6 +95,39 @@ async function compare(what, file, options, args, without = {}) {
                                ['groundDepth', 1.5]])
     await refuses(`heights.${name}: ${value}`, () => load(bytes, { heights: { ...heights, [name]: value } }));
   await refuses('heights that are null', () => load(bytes, { heights: null }));
+}
+
+// ---- Resource packs: a stone of half the height, and one of a quarter.
+{
+  const scene = join(scratch, 'scene.json');
+  const house = join(scratch, 'house.schem');
+  const stone = { name: 'minecraft:stone', colour: [120, 120, 120, 255] };
+  const vox = join(scratch, 'one.vox');
+  writeFileSync(vox, oneVoxel());
+  execFileSync(tool, ['convert', vox, scene, '-q']);
+  const json = JSON.parse(readFileSync(scene));
+  writeFileSync(scene, JSON.stringify({ ...json, types: json.types.map(() => stone) }));
+  execFileSync(tool, ['convert', scene, house, '-q']);
+  const [half, quarter] = [8, 4].map(stonePack);
+  const [halfFile, quarterFile] = [half, quarter].map((pack, i) => {
+    const file = join(scratch, `pack-${i}.zip`);
+    writeFileSync(file, pack);
+    return file;
+  });
+  await compare('a pack', house, { packs: [half] }, ['--pack', halfFile]);
+  await compare('the last of two packs', house, { packs: [half, quarter] }, ['--pack', quarterFile], { packs: [half] });
+  const buffer = half.buffer.slice(half.byteOffset, half.byteOffset + half.byteLength);
+  await compare('packs from an ArrayBuffer and a view', house, { packs: [buffer, quarter], small: true },
+                ['--pack', halfFile, '--pack', quarterFile]);
+  await compare("Quoin's own pack", house, { packs: ['builtin'] }, ['--pack', 'builtin']);
+  await compare('a pack above the own one', house, { packs: ['builtin', half] },
+                ['--pack', halfFile, '--pack', 'builtin'], { packs: ['builtin'] });
+  const bytes = readFileSync(house);
+  await refuses('a pack that is no zip file', () => load(bytes, { packs: [new Uint8Array(40)] }), 'bad_format');
+  await refuses('a pack that is cut off', () => load(bytes, { packs: [half.subarray(0, half.length - 30)] }),
+                'bad_format');
+  for (const wrong of ['builtin', half, [half, null], ['other'], [3]])
+    await refuses('packs that are no list of bytes', () => load(bytes, { packs: wrong }));
 }
 
 // ---- Triangles.

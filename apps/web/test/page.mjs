@@ -4,17 +4,12 @@ import { readFile, writeFile } from 'node:fs/promises';
 import { basename, join } from 'node:path';
 import { headless, requirements, serve } from '../../../tests/web/browser.mjs';
 import { checkAloud as check, found } from './checks.mjs';
+import { oneVoxel, stonePack } from './packs.mjs';
 
 const [page, file, nativeGlb, image, corpus] = process.argv.slice(2);
 const { chromium, launcher } = await requirements('skipped, the page only');
 const server = await serve((path) => (path === '/castle.vox' ? file : join(page, path === '/' ? 'index.html' : path)));
 const site = `http://127.0.0.1:${server.address().port}/`;
-
-function oneVoxel() {
-  const id = (name) => Buffer.from(name).readUInt32LE();
-  return Buffer.from(Uint32Array.of(id('VOX '), 150, id('MAIN'), 0, 44, id('SIZE'), 12, 0, 1, 1, 1,
-                                    id('XYZI'), 8, 0, 1, 1 << 24).buffer);
-}
 
 /** Returns a volume: a ball, or a constant `value`. */
 function ball(value) {
@@ -196,6 +191,27 @@ try {
   await tab.keyboard.press('m');
   check(await tab.getAttribute('#measure', 'aria-pressed') === 'true', 'letters are keys where a slider has the focus');
   await tab.keyboard.press('m');
+
+  // A resource pack gives blocks of Minecraft their looks.
+  await drop({ name: 'house.schem', bytes: await readFile(join(corpus, 'cases/schem-bamboo-is-glass.schem')) });
+  await shown('house.schem');
+  const plain = await download('#glb');
+  const saysOf = (text) => tab.waitForFunction(
+    (start) => document.querySelector('#status').textContent.startsWith(start), text, { timeout: 60_000 });
+  await drop({ name: 'stone.zip', bytes: stonePack(8) });
+  await saysOf('stone.zip gives');
+  check(await tab.textContent('#packs span') === 'stone.zip', 'the panel names the pack');
+  check(!(await download('#glb')).bytes.equals(plain.bytes), 'a pack changes the blocks of the current file');
+  await drop({ name: 'noise.zip', bytes: noise });
+  await saysOf('noise.zip: ');
+  check(await tab.isVisible('#status.error'), `no pack: ${await status()}`);
+  check(await tab.textContent('#packs span') === 'stone.zip', 'a broken pack is not used');
+  await tab.click('#no-packs');
+  await shown('house.schem');
+  check((await download('#glb')).bytes.equals(plain.bytes), 'without packs the blocks are as before');
+  check(!(await tab.isVisible('#packs')), 'and none is named');
+  await tab.setInputFiles('#other', file);
+  await shown(basename(file));
 
   const broken = await browser.newPage();
   await broken.route('**/worker.js', (route) => route.fulfill({ status: 404 }));
