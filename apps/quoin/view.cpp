@@ -20,6 +20,7 @@ namespace {
 struct ViewArguments {
   std::filesystem::path input;
   LoadOptions load;
+  bool has_packs = false;
   Threads threads;
   ImageSize size;
   std::filesystem::path screenshot;
@@ -49,6 +50,7 @@ int run_view(const ViewArguments& arguments) {
   viewer::ViewerOptions options;
   options.file = arguments.input;
   options.load = arguments.load;
+  options.uses_own_packs = arguments.has_packs;
   options.threads = arguments.threads;
   options.width = arguments.size.width;
   options.height = arguments.size.height;
@@ -168,6 +170,7 @@ void add_view_command(CLI::App& app, int& status) {
       "Example: quoin view castle.vox\n"
       "Example: quoin view scan.raw --raw-size 256x256x128 --raw-type uint16");
   command->callback([command, arguments, &status] {
+    arguments->has_packs = command->count("--pack") > 0;
     const Status fits = check_rules(*command, view_rules(*arguments));
     status = fits ? run_view(*arguments) : wrong_usage(fits.error());
   });

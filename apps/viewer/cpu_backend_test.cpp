@@ -8,6 +8,8 @@
 #include <numbers>
 #include <random>
 #include <string>
+#include <thread>
+#include <vector>
 
 #ifdef __linux__
 #include <sys/resource.h>
@@ -510,12 +512,61 @@ MakeBackend by_processor() {
   };
 }
 
+// Other looks of the same types: a shape, then a cube again.
+TEST(CpuBackend, ShowsOtherPacks) {
+  const ScratchFolder folder("looks");
+  const auto house = write_house(folder);
+  const auto document = Document::open(house, {.packs = {write_stone_pack(folder, "red", 16)}});
+  ASSERT_TRUE(document) << to_string(document.error());
+  Watched watched((*document)->scene());
+  const ViewRequest request = request_for((*document)->scene(), View::Iso);
+  watched.backend.show(request);
+  ASSERT_FALSE(watched.settle().empty());
+  const std::vector<std::vector<std::filesystem::path>> lists = {
+      {write_stone_pack(folder, "half", 8)}, {}, {kBuiltinPack}, {folder.file("red")}};
+  std::vector<std::vector<std::uint8_t>> images;
+  for (const auto& packs : lists) {
+    const auto packed = packed_types(*(*document)->plain_types(), packs);
+    ASSERT_TRUE(packed);
+    {
+      const ScenePause pause(watched.backend);
+      (*document)->set_looks(packed->types);
+    }
+    const auto frames = watched.settle();
+    ASSERT_FALSE(frames.empty());
+    const auto fresh = Document::open(house, {.packs = packs});
+    ASSERT_TRUE(fresh);
+    EXPECT_EQ(frames.back().colour.rgb, expected((*fresh)->scene(), request).rgb);
+    for (const auto& other : images) EXPECT_NE(frames.back().colour.rgb, other);
+    images.push_back(frames.back().colour.rgb);
+  }
+  EXPECT_FALSE((*document)->is_dirty());
+}
+
+TEST(PackLoader, ReadsInBackground) {
+  const ScratchFolder folder("packing");
+  const auto document = Document::open(write_house(folder));
+  ASSERT_TRUE(document);
+  Bell bell;
+  const std::string pack = write_stone_pack(folder, "half", 8).string();
+  const PackLoader loader(*(*document)->plain_types(), {pack}, pack, [&bell] { bell.ring(); });
+  ASSERT_TRUE(bell.wait());
+  while (!loader.is_done()) std::this_thread::yield();
+  ASSERT_TRUE(loader.result());
+  EXPECT_TRUE(loader.result()->types.has_shapes());
+  EXPECT_EQ(loader.choice(), pack);
+  const PackLoader absent({}, {folder.file("absent.jar")}, "absent.jar", nullptr);
+  while (!absent.is_done()) std::this_thread::yield();
+  ASSERT_FALSE(absent.result());
+  EXPECT_EQ(absent.result().error().code, ErrorCode::CannotRead);
+}
+
 TEST(Loader, ReadsInBackground) {
   const ScratchFolder folder("loader");
   std::vector<std::string> warnings;
   ASSERT_TRUE(small_document().write(folder.file("hill.vox"), warnings));
   Bell bell;
-  Loader loader(folder.file("hill.vox"), {}, {}, by_processor(), [&bell] { bell.ring(); });
+  Loader loader(folder.file("hill.vox"), {}, {}, PackFallback::Error, by_processor(), [&bell] { bell.ring(); });
   ASSERT_TRUE(bell.wait());
   ASSERT_TRUE(loader.is_done());
   auto opened = loader.take();
@@ -529,7 +580,7 @@ TEST(Loader, CancelsAtAnyTime) {
   std::vector<std::string> warnings;
   ASSERT_TRUE(small_document().write(folder.file("hill.vox"), warnings));
   for (int attempt = 0; attempt < 50; ++attempt) {
-    Loader loader(folder.file("hill.vox"), {}, {}, by_processor(), nullptr);
+    Loader loader(folder.file("hill.vox"), {}, {}, PackFallback::Error, by_processor(), nullptr);
     loader.cancel();
     while (!loader.is_done()) std::this_thread::yield();
     const auto result = loader.take();
@@ -541,7 +592,7 @@ TEST(Loader, CancelsAtAnyTime) {
 
 TEST(Loader, ReportsReadErrors) {
   Bell bell;
-  Loader loader("/nowhere/a.vox", {}, {}, by_processor(), [&bell] { bell.ring(); });
+  Loader loader("/nowhere/a.vox", {}, {}, PackFallback::Error, by_processor(), [&bell] { bell.ring(); });
   ASSERT_TRUE(bell.wait());
   EXPECT_EQ(loader.take().error().code, ErrorCode::CannotRead);
 }

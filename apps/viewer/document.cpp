@@ -7,6 +7,8 @@
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <quoin/core/assert.h>
+#include <quoin/io/block_packs.h>
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
@@ -62,15 +64,29 @@ bool can_write(const std::filesystem::path& path) {
 }
 
 Document::Document(LoadedScene loaded, std::filesystem::path path)
-    : loaded_(std::move(loaded)), path_(std::move(path)), stamp_(FileStamp::of(path_)) {
+    : loaded_(std::move(loaded)),
+      plain_types_(loaded_.scene.types),
+      path_(std::move(path)),
+      stamp_(FileStamp::of(path_)) {
   faces_.update(loaded_.scene);
 }
 
 Document::Document(WorldWindow world, std::filesystem::path path)
     : world_(std::make_unique<WorldWindow>(std::move(world))), path_(std::move(path)) {}
 
+Result<PackedTypes> packed_types(VoxelRegistry plain, std::span<const std::filesystem::path> packs) {
+  PackedTypes packed{std::move(plain), {}};
+  if (packs.empty()) return packed;
+  const auto opened = BlockPacks::open(packs);
+  if (!opened) return opened.error();
+  (*opened)->apply(packed.types);
+  packed.warning = to_string((*opened)->report());
+  return packed;
+}
+
 Result<std::unique_ptr<Document>> Document::open(const std::filesystem::path& path, const LoadOptions& options,
-                                                 const Progress& progress, const WorldOptions& world) {
+                                                 const Progress& progress, const WorldOptions& world,
+                                                 PackFallback fallback) {
   // Taken before opening, so that a write during the read counts as a change.
   const auto stamp = FileStamp::of(path);
   const auto file = options.raw ? Result<DetectedFile>(DetectedFile{path, std::nullopt}) : detect_file(path);
@@ -82,11 +98,31 @@ Result<std::unique_ptr<Document>> Document::open(const std::filesystem::path& pa
   }
   LoadOptions as_saved = options;
   as_saved.show_hidden = false;
+  as_saved.packs.clear();  // so that the types as read are known
   auto loaded = load_scene(*file, as_saved, {}, progress);
   if (!loaded) return loaded.error();
+  const VoxelRegistry plain = loaded->scene.types;
+  auto packed = packed_types(plain, options.packs);
+  if (!packed && fallback == PackFallback::OwnPack) {
+    loaded->warnings.push_back("cannot use the chosen resource pack: " + to_string(packed.error()));
+    packed = packed_types(plain, packs_for_images({}));
+  }
+  if (!packed) return packed.error();
+  loaded->scene.types = std::move(packed->types);
+  if (!packed->warning.empty()) loaded->warnings.push_back(std::move(packed->warning));
   auto document = std::make_unique<Document>(std::move(*loaded), path);
+  document->plain_types_ = plain;
   document->stamp_ = stamp;
   return document;
+}
+
+void Document::set_looks(const VoxelRegistry& types) {
+  QUOIN_ASSERT(world_ == nullptr && types.size() == plain_types_.size(), "types made of the plain ones");
+  VoxelRegistry& now = loaded_.scene.types;
+  for (std::size_t i = 1; i < types.size(); ++i) {
+    const auto type = static_cast<VoxelType>(i);
+    if (!(now[type] == types[type])) now.replace(type, types[type]);
+  }
 }
 
 const char* Document::why_not_edited() const {

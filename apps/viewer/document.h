@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,21 @@
 #include "world_window.h"
 
 namespace quoin::viewer {
+
+/// The behaviour if the resource packs of LoadOptions cannot be opened.
+enum class PackFallback : std::uint8_t {
+  Error,   ///< opening the file fails
+  OwnPack  ///< kBuiltinPack is used instead, and the loaded scene has a warning
+};
+
+/// Types with the looks of resource packs. `warning` lists the missing files; empty if none is missing.
+struct PackedTypes {
+  VoxelRegistry types;
+  std::string warning;
+};
+
+/// Gives types the looks of packs (BlockPacks). No packs: returns `plain`. Errors: those of BlockPacks::open.
+[[nodiscard]] Result<PackedTypes> packed_types(VoxelRegistry plain, std::span<const std::filesystem::path> packs);
 
 /// A scene under edit, its file, and its undo history. A world on disk is streamed: chunks come and go, and edits are
 /// saved as they are made.
@@ -36,13 +52,20 @@ class Document {
   [[nodiscard]] static Result<std::unique_ptr<Document>> open(const std::filesystem::path& path,
                                                               const LoadOptions& options = {},
                                                               const Progress& progress = {},
-                                                              const WorldOptions& world = {});
+                                                              const WorldOptions& world = {},
+                                                              PackFallback fallback = PackFallback::Error);
 
   [[nodiscard]] const Scene& scene() const { return loaded().scene; }
   [[nodiscard]] const LoadedScene& loaded() const { return world_ ? world_->opened() : loaded_; }
   /// Null if the document is not a world on disk.
   [[nodiscard]] WorldWindow* world() { return world_.get(); }
   [[nodiscard]] const WorldWindow* world() const { return world_.get(); }
+  /// Returns the types as read, before LoadOptions::packs gave them looks. Null for a world on disk, whose file stores
+  /// its looks.
+  [[nodiscard]] const VoxelRegistry* plain_types() const { return world_ ? nullptr : &plain_types_; }
+  /// Replaces the looks of the types that were read. Types that the user added stay. Not an undo step, and no change to
+  /// save. Requires: plain_types() is not null, and `types` were made of them (packed_types).
+  void set_looks(const VoxelRegistry& types);
   /// Returns the reason to show if the document cannot be edited, else null.
   [[nodiscard]] const char* why_not_edited() const;
   /// Empty if the scene has no file.
@@ -130,6 +153,7 @@ class Document {
                             const SceneGrid& grid);
 
   LoadedScene loaded_;                  // unused if this is a world
+  VoxelRegistry plain_types_;           // of `loaded_` as read, without packs
   std::unique_ptr<WorldWindow> world_;  // null if this is not a world
   bool has_failed_ = false;             // the world's last save
   SceneFaces faces_;

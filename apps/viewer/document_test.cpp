@@ -415,6 +415,44 @@ TEST(Document, SaveChangesOnlyStrokeAndKeepsBackup) {
   EXPECT_TRUE((*document)->losses(path).value().empty()) << "written by this document";
 }
 
+TEST(Document, ChangesLooksOfTypesAsRead) {
+  const ScratchFolder folder("packs");
+  const auto house = write_house(folder);
+  const auto half = write_stone_pack(folder, "half", 8);
+  const auto document = Document::open(house, {.packs = {half, kBuiltinPack}});
+  ASSERT_TRUE(document) << to_string(document.error());
+  Document& opened = **document;
+  const VoxelRegistry& types = opened.scene().types;
+  ASSERT_GE(types.size(), 2U);
+  EXPECT_FALSE(types[1].shapes.empty());
+  ASSERT_NE(opened.plain_types(), nullptr);
+  EXPECT_TRUE((*opened.plain_types())[1].shapes.empty());
+  const auto added = opened.type_of_colour({1, 2, 3, 255});
+  ASSERT_TRUE(added);
+  const auto own = packed_types(*opened.plain_types(), packs_for_images({}));
+  ASSERT_TRUE(own);
+  opened.set_looks(own->types);
+  EXPECT_TRUE(types[1].shapes.empty());
+  EXPECT_FALSE(types[1].faces.empty());
+  opened.set_looks(*opened.plain_types());
+  EXPECT_TRUE(types[1].faces.empty());
+  EXPECT_EQ(types[*added].colour, (Rgba8{1, 2, 3, 255})) << "types that the user added stay";
+}
+
+TEST(Document, FallsBackToTheOwnPackWithAWarning) {
+  const ScratchFolder folder("fallback");
+  const auto house = write_house(folder);
+  const LoadOptions options{.packs = {folder.file("absent.jar"), kBuiltinPack}};
+  const auto refused = Document::open(house, options);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::CannotRead);
+  const auto document = Document::open(house, options, {}, {}, PackFallback::OwnPack);
+  ASSERT_TRUE(document);
+  ASSERT_EQ((*document)->loaded().warnings.size(), 1U);
+  EXPECT_NE((*document)->loaded().warnings[0].find("absent.jar"), std::string::npos);
+  EXPECT_FALSE((*document)->scene().types[1].faces.empty());
+}
+
 TEST(Document, ReportsUnsupportedFeaturesOnce) {
   const ScratchFolder folder("losing");
   const auto path = write_layered(folder);

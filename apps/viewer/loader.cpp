@@ -14,13 +14,13 @@ Error out_of_memory(const std::filesystem::path& path) {
 
 }  // namespace
 
-Loader::Loader(std::filesystem::path path, const LoadOptions& options, const WorldOptions& world,
+Loader::Loader(std::filesystem::path path, const LoadOptions& options, const WorldOptions& world, PackFallback fallback,
                MakeBackend make_backend, std::function<void()> on_done)
     : path_(std::move(path)) {
-  thread_ = std::thread([this, options, world, make = std::move(make_backend), done = std::move(on_done)] {
+  thread_ = std::thread([this, options, world, fallback, make = std::move(make_backend), done = std::move(on_done)] {
     yield_to_window();
     try {
-      work(options, world, make);
+      work(options, world, fallback, make);
     } catch (const std::bad_alloc&) {
       result_ = out_of_memory(path_);
     }
@@ -34,12 +34,13 @@ Loader::~Loader() {
   thread_.join();
 }
 
-void Loader::work(const LoadOptions& options, const WorldOptions& world, const MakeBackend& make_backend) {
+void Loader::work(const LoadOptions& options, const WorldOptions& world, PackFallback fallback,
+                  const MakeBackend& make_backend) {
   const auto report = [this](double share) {
     fraction_ = share;
     return !is_abandoned_;
   };
-  auto document = Document::open(path_, options, report, world);
+  auto document = Document::open(path_, options, report, world, fallback);
   if (!document) {
     result_ = document.error();
     return;
@@ -68,6 +69,26 @@ Result<OpenDocument> Loader::take() {
   Result<OpenDocument> taken = std::move(*result_);
   result_.reset();
   return taken;
+}
+
+PackLoader::PackLoader(VoxelRegistry plain, std::vector<std::filesystem::path> packs, std::string choice,
+                       std::function<void()> on_done)
+    : choice_(std::move(choice)) {
+  thread_ =
+      std::thread([this, types = std::move(plain), named = std::move(packs), done = std::move(on_done)]() mutable {
+        yield_to_window();
+        try {
+          result_ = packed_types(std::move(types), named);
+        } catch (const std::bad_alloc&) {
+          result_ = out_of_memory(named.empty() ? std::filesystem::path() : named.front());
+        }
+        is_done_ = true;
+        if (done) done();
+      });
+}
+
+PackLoader::~PackLoader() {
+  thread_.join();
 }
 
 Saver::Saver(const Document& document, std::filesystem::path path, bool accepts_unsupported,

@@ -5,7 +5,9 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "cpu_backend.h"
 #include "document.h"
@@ -27,8 +29,8 @@ using MakeBackend = std::function<std::unique_ptr<ViewBackend>(const Document&)>
 class Loader {
  public:
   /// The loading thread calls `on_done`, unless the loader is destroyed first.
-  Loader(std::filesystem::path path, const LoadOptions& options, const WorldOptions& world, MakeBackend make_backend,
-         std::function<void()> on_done);
+  Loader(std::filesystem::path path, const LoadOptions& options, const WorldOptions& world, PackFallback fallback,
+         MakeBackend make_backend, std::function<void()> on_done);
   Loader(const Loader&) = delete;
   Loader& operator=(const Loader&) = delete;
   /// Cancels, and waits until the current model has been read. Keep a cancelled loader alive to avoid the wait.
@@ -48,7 +50,8 @@ class Loader {
   [[nodiscard]] Result<OpenDocument> take();
 
  private:
-  void work(const LoadOptions& options, const WorldOptions& world, const MakeBackend& make_backend);
+  void work(const LoadOptions& options, const WorldOptions& world, PackFallback fallback,
+            const MakeBackend& make_backend);
 
   std::filesystem::path path_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
@@ -57,6 +60,29 @@ class Loader {
   std::atomic<bool> is_done_{false};
   std::atomic<bool> is_abandoned_{false};
   std::optional<Result<OpenDocument>> result_;
+  std::thread thread_;
+};
+
+/// Opens resource packs and gives types their looks on a separate thread.
+class PackLoader {
+ public:
+  /// `choice`: the setting that the packs are for. The thread calls `on_done` at the end.
+  PackLoader(VoxelRegistry plain, std::vector<std::filesystem::path> packs, std::string choice,
+             std::function<void()> on_done);
+  PackLoader(const PackLoader&) = delete;
+  PackLoader& operator=(const PackLoader&) = delete;
+  /// Waits until the packs have been read.
+  ~PackLoader();
+
+  [[nodiscard]] const std::string& choice() const { return choice_; }
+  [[nodiscard]] bool is_done() const { return is_done_; }
+  /// Requires: is_done().
+  [[nodiscard]] const Result<PackedTypes>& result() const { return *result_; }
+
+ private:
+  std::string choice_;
+  std::optional<Result<PackedTypes>> result_;
+  std::atomic<bool> is_done_{false};
   std::thread thread_;
 };
 

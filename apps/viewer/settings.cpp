@@ -178,6 +178,8 @@ Settings parse_settings(std::string_view json) {
     read_environment(*light, settings);
   }
   read_recent(object, settings.recent);
+  const Json* pack = find(object, "pack");
+  if (pack != nullptr && pack->is_string() && !pack->get<std::string>().empty()) settings.pack = *pack;
   return settings;
 }
 
@@ -214,7 +216,8 @@ std::string to_json(const Settings& settings) {
                    {"lamps", light.max_lamps},
                    {"lamp_brightness", environment.lamp_brightness},
                    {"exposure", settings.exposure}}},
-                 {"recent", settings.recent}};
+                 {"recent", settings.recent},
+                 {"pack", settings.pack}};
   if (std::isfinite(light.shadow_distance_voxels)) object["light"]["shadow_distance"] = light.shadow_distance_voxels;
   if (settings.ui_scale > 0.0) object["ui_scale"] = settings.ui_scale;
   return object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

@@ -7,6 +7,7 @@
 
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
+#include <quoin/io/block_packs.h>
 #include <quoin/render/light_options.h>
 #include <quoin/scene/environment.h>
 
@@ -32,11 +33,15 @@ struct Settings {
   /// For files without an environment of their own. Saved are its sun direction, brightnesses and whether the sky
   /// follows the sun.
   Environment environment;
-  double exposure = 1.0;            ///< factor on the environment's exposure
+  double exposure = 1.0;  ///< factor on the environment's exposure
+  /// The resource pack for blocks of Minecraft: kBuiltinPack, kNoPack, or the path of a pack, such as a client's .jar.
+  std::string pack = kBuiltinPack;
   std::vector<std::string> recent;  ///< files, newest first
 
   /// Moves a file to the front of `recent`, which keeps at most ten.
   void note_recent(const std::filesystem::path& file);
+  /// Returns the packs of `pack` for LoadOptions::packs.
+  [[nodiscard]] std::vector<std::filesystem::path> packs() const { return packs_for_images({pack}); }
 };
 
 /// Returns $XDG_CONFIG_HOME/quoin/viewer.json or ~/.config/quoin/viewer.json; empty if neither variable holds an

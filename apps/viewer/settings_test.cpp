@@ -40,6 +40,7 @@ TEST(Settings, RoundTripThroughFile) {
   settings.environment.lamp_brightness = 8.0;
   settings.mode = DrawMode::Density;
   settings.slice = {2, 0.25};
+  settings.pack = "/tmp/\xC3\xA9 1.21.jar";
   settings.note_recent("/tmp/a.vox");
   settings.note_recent("/tmp/b\n\xff.vox");
   const Status written = write_settings(settings, path);
@@ -57,6 +58,7 @@ TEST(Settings, RoundTripThroughFile) {
   EXPECT_EQ(back.light, settings.light);
   EXPECT_EQ(back.environment, settings.environment);
   EXPECT_EQ(back.exposure, settings.exposure);
+  EXPECT_EQ(back.pack, settings.pack);
   ASSERT_EQ(back.recent.size(), 2U);
   EXPECT_EQ(back.recent[1], "/tmp/a.vox");
 }
@@ -100,10 +102,22 @@ TEST(Settings, IgnoresInvalidValues) {
                            "{\"light\": {\"smooth_occlusion\": 3}}",
                            "{\"light\": {\"smooth_occlusion\": {\"form\": \"soft\", \"spread\": 9, \"power\": 0}}}",
                            "{\"fly\": 1}",
+                           "{\"pack\": \"\"}",
+                           "{\"pack\": [1]}",
                            "{\"ui_scale\": 0}"}) {
     EXPECT_EQ(to_json(parse_settings(text)), defaults) << text;
   }
   EXPECT_EQ(parse_settings("{\"height\": false, \"width\": 800}").width, 800) << "other values are kept";
+}
+
+TEST(Settings, NamePacksForImages) {
+  using Paths = std::vector<std::filesystem::path>;
+  Settings settings;
+  EXPECT_EQ(settings.packs(), Paths{kBuiltinPack});
+  settings.pack = kNoPack;
+  EXPECT_EQ(settings.packs(), Paths{});
+  settings.pack = "/tmp/1.21.jar";
+  EXPECT_EQ(settings.packs(), (Paths{"/tmp/1.21.jar", kBuiltinPack}));
 }
 
 TEST(Settings, KeepsTenRecentFilesNewestFirst) {

@@ -6,9 +6,16 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <map>
 #include <random>
 #include <string>
 
+#include <gtest/gtest.h>
+#include <quoin/core/image.h>
+#include <quoin/io/block_packs.h>
+#include <quoin/io/formats.h>
+#include <quoin/io/image_files.h>
 #include <quoin/io/vox.h>
 
 #include "document.h"
@@ -81,5 +88,48 @@ class ScratchFolder {
  private:
   std::filesystem::path path_;
 };
+
+/// Writes a schematic of some stones of Minecraft.
+inline std::filesystem::path write_house(const ScratchFolder& folder) {
+  Scene scene;
+  const auto stone = scene.types.add({.name = "minecraft:stone"});
+  EXPECT_TRUE(stone);
+  SceneGrid grid;
+  for (const IVec3 at : {IVec3(0, 0, 0), IVec3(1, 0, 0), IVec3(2, 0, 1), IVec3(1, 1, 1)}) grid.grid.set(at, *stone);
+  Instance instance;
+  instance.grid = scene.add_grid(std::move(grid));
+  scene.add_instance(instance);
+  const std::filesystem::path path = folder.file("house.schem");
+  EXPECT_TRUE(save_scene(scene, path));
+  return path;
+}
+
+/// Returns the files of a resource pack whose stone is a box of that height, in sixteenths, by path.
+inline std::map<std::string, std::string> stone_pack(int height) {
+  AlphaImage red{16, 16, {}};
+  for (int i = 0; i < 256; ++i) red.rgba.insert(red.rgba.end(), {200, 40, 40, 255});
+  const auto png = write_png(red);
+  EXPECT_TRUE(png);
+  std::string faces;
+  for (const char* const side : {"down", "up", "north", "south", "west", "east"}) {
+    faces += std::string(faces.empty() ? "" : ", ") + "\"" + side + R"(": {"texture": "#all"})";
+  }
+  return {{"assets/minecraft/blockstates/stone.json", R"({"variants": {"": {"model": "block/stone"}}})"},
+          {"assets/minecraft/models/block/stone.json",
+           R"({"textures": {"all": "block/stone"}, "elements": [{"from": [0, 0, 0], "to": [16, )" +
+               std::to_string(height) + R"(, 16], "faces": {)" + faces + "}}]}"},
+          {"assets/minecraft/textures/block/stone.png",
+           std::string(reinterpret_cast<const char*>(png->data()), png->size())}};
+}
+
+/// Writes such a pack as a folder, and returns its path.
+inline std::filesystem::path write_stone_pack(const ScratchFolder& folder, const std::string& name, int height) {
+  for (const auto& [path, text] : stone_pack(height)) {
+    const std::filesystem::path file = folder.file(name) / path;
+    std::filesystem::create_directories(file.parent_path());
+    std::ofstream(file, std::ios::binary) << text;
+  }
+  return folder.file(name);
+}
 
 }  // namespace quoin::viewer

@@ -79,6 +79,7 @@ App::App(const ViewerOptions& options, Settings settings, std::unique_ptr<Screen
   if (const auto renderer = screen_->renderer(); renderer && renderer->device().kind == "cpu" && !options_.is_bare) {
     state_.report(renderer->device().name + " is a slow software device; --backend auto is faster");
   }
+  state_.has_named_packs = options_.uses_own_packs;
   if (!options_.file.empty()) load(options_.file);
 }
 
@@ -94,7 +95,7 @@ void App::close() {
 
 bool App::ends_late() {
   close();
-  const bool reads = state_.loader != nullptr || !abandoned_.empty();
+  const bool reads = state_.loader != nullptr || state_.pack_loader != nullptr || !abandoned_.empty();
   return reads || (state_.open.backend && state_.open.backend->ends_late());
 }
 
@@ -137,8 +138,8 @@ bool App::is_moving() const {
 
 bool App::is_animating() const {
   if (screen_->is_minimised()) return is_streaming();
-  return is_moving() || is_streaming() || state_.loader || state_.saver || state_.message || state_.waiting_since ||
-         ImGui::GetIO().WantTextInput;
+  return is_moving() || is_streaming() || state_.loader || state_.saver || state_.pack_loader || state_.message ||
+         state_.waiting_since || ImGui::GetIO().WantTextInput;
 }
 
 int App::patience_milliseconds() const {
@@ -202,6 +203,7 @@ void App::frame() {
   const double step = was_idle_ ? kFrameSeconds : std::min(elapsed, 0.1);
   take_loaded();
   take_saved();
+  take_packed();
   stream_world();
   if (screen_->is_minimised()) return;
   if (state_.camera.mode == CameraMode::Walk) {

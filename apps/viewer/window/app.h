@@ -98,6 +98,8 @@ class App {
   void adopt(OpenDocument opened);
   void save(const std::filesystem::path& path, bool accepts_unsupported = false);
   void take_saved();
+  void choose_pack(const std::string& pack);
+  void take_packed();
   void ask_where_to_save();
   void want_image();
   [[nodiscard]] std::optional<Result<Image>> image_in_mode(DrawMode mode) const;
@@ -135,6 +137,8 @@ class App {
   std::optional<BeforeDetail> before_detail_;
   std::optional<Leaving> leaving_;
   std::optional<LossySave> lossy_save_;
+  std::uint64_t documents_ = 0;                     // opened so far
+  std::uint64_t packed_ = 0;                        // the document that the pack loader makes looks for
   std::vector<std::unique_ptr<Loader>> abandoned_;  // their threads end by themselves
   bool is_running_ = true;
   std::vector<WantedImage> wanted_;

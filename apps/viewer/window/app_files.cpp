@@ -89,11 +89,46 @@ void App::load(const std::filesystem::path& path) {
         document.scene(), backend, [this] { return open_device(); }, wake_window);
   };
   LoadOptions wanted = options_.load;
+  if (!state_.has_named_packs) {
+    wanted.packs = state_.settings.packs();
+    wanted.scene_packs = !wanted.packs.empty();
+  }
   // The raw-volume options describe only the file that the viewer was started with.
   if (path != options_.file) wanted.raw.reset();
   WorldOptions world = options_.world;
   if (!options_.screenshot.empty()) world.may_write = false;
-  state_.loader = std::make_unique<Loader>(path, wanted, world, make, wake_window);
+  const PackFallback fallback = state_.has_named_packs ? PackFallback::Error : PackFallback::OwnPack;
+  state_.loader = std::make_unique<Loader>(path, wanted, world, fallback, make, wake_window);
+}
+
+// Uses another resource pack for the open file and later ones.
+void App::choose_pack(const std::string& pack) {
+  if (!state_.can_choose_pack()) return;
+  Settings wanted = state_.settings;
+  wanted.pack = pack;
+  const VoxelRegistry* const plain = state_.open.backend ? state_.open.document->plain_types() : nullptr;
+  const VoxelRegistry none;
+  packed_ = documents_;
+  state_.pack_loader =
+      std::make_unique<PackLoader>(plain == nullptr ? none : *plain, wanted.packs(), pack, wake_window);
+}
+
+// Shows the looks of a pack once it has been read. If it cannot be read, the pack in use stays.
+void App::take_packed() {
+  if (!state_.pack_loader || !state_.pack_loader->is_done() || state_.loader || state_.saver) return;
+  const std::unique_ptr<PackLoader> packed = std::move(state_.pack_loader);
+  if (!packed->result()) return state_.report(packed->result().error());
+  if (packed_ != documents_) return choose_pack(packed->choice());  // another file was opened meanwhile
+  state_.settings.pack = packed->choice();
+  state_.has_named_packs = false;
+  const PackedTypes& looks = *packed->result();
+  const VoxelRegistry* const plain = state_.open.backend ? state_.open.document->plain_types() : nullptr;
+  if (plain != nullptr && plain->size() == looks.types.size()) {
+    const ScenePause pause(*state_.open.backend);
+    state_.open.document->set_looks(looks.types);
+    state_.stats.is_settled = false;
+  }
+  if (!looks.warning.empty()) state_.report(looks.warning);
 }
 
 void App::take_loaded() {
@@ -111,6 +146,7 @@ void App::take_loaded() {
 
 // Replaces the document by an empty one.
 void App::close_document() {
+  ++documents_;
   asked_.reset();
   save_wanted_images();
   input_.editing = {};

@@ -92,6 +92,7 @@ void App::draw_bars() {
   for (const Command command : choice.commands) run_command(command);
   if (choice.recent) leave({false, *choice.recent});
   if (choice.camera) look_through(*choice.camera);
+  if (choice.pack) choose_pack(*choice.pack);
 }
 
 void App::draw_loading() {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "viewer/camera/camera_control.h"
+#include "viewer/clients.h"
 #include "viewer/loader.h"
 #include "viewer/settings.h"
 #include "viewer/window/panel/scene_tree.h"
@@ -78,6 +79,9 @@ struct ViewState {
   bool is_help_shown = false;
   std::unique_ptr<Loader> loader;
   std::unique_ptr<Saver> saver;
+  std::unique_ptr<PackLoader> pack_loader;
+  std::optional<std::vector<InstalledClient>> clients;  ///< for the menu; searched when it is first opened
+  bool has_named_packs = false;                         ///< packs of the command line replace Settings::pack
 
   [[nodiscard]] const Scene& scene() const { return open.document->scene(); }
   /// Returns the environment of the images, which the panel changes.
@@ -93,6 +97,8 @@ struct ViewState {
   [[nodiscard]] bool has_image_place() const { return image_place.w > 0 && image_place.h > 0; }
   /// Returns true if the document can be changed now.
   [[nodiscard]] bool can_edit() const { return open.backend != nullptr && !saver && !loader; }
+  /// Returns true if another resource pack can be chosen now.
+  [[nodiscard]] bool can_choose_pack() const { return !saver && !loader && !pack_loader; }
   /// Returns the reason to show if the scene cannot be drawn in that mode, else null.
   [[nodiscard]] const char* why_not_drawn_as(DrawMode mode) const;
   /// Changes the camera mode. Walking starts at the point under the mouse or the middle of the scene, with a person's

@@ -24,7 +24,8 @@ enum class ViewerBackend : std::uint8_t {
 struct ViewerOptions {
   std::filesystem::path file;  ///< empty: an empty window
   LoadOptions load;
-  WorldOptions world;  ///< of worlds on disk
+  bool uses_own_packs = false;  ///< `load.packs` replaces the pack of the settings until the user chooses another
+  WorldOptions world;           ///< of worlds on disk
   Threads threads;
   ViewerBackend backend = ViewerBackend::Auto;
   std::string device;               ///< as VulkanOptions::device

@@ -11,11 +11,14 @@
 #include <unistd.h>
 
 #include <gtest/gtest.h>
+#include <quoin/io/file.h>
 #include <quoin/io/image_files.h>
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render/path_tracer.h>
 
 #include "core/work/nightly_for_tests.h"
+#include "io/zip.h"
+#include "viewer/settings.h"
 #include "viewer/viewer_fixture.h"
 #include "viewer/window/process_facts_for_tests.h"
 
@@ -120,6 +123,54 @@ TEST_F(ViewerTest, DrawsPanelsAtAnyWindowSize) {
     EXPECT_GT(shot->width, 0);
   }
   EXPECT_TRUE(std::filesystem::exists(folder_.file("config/quoin/viewer.json")));
+}
+
+/// Installs a client of Minecraft 1.21 in the folder home, whose stones have half the height. Returns its .jar.
+std::filesystem::path install_client(const ScratchFolder& folder) {
+  ZipFile zip;
+  for (const auto& [name, text] : stone_pack(8)) {
+    zip.begin(name);
+    zip.put(text);
+  }
+  const auto bytes = zip.take();
+  EXPECT_TRUE(bytes);
+  const std::filesystem::path jar = folder.file("home/.minecraft/versions/1.21/1.21.jar");
+  std::filesystem::create_directories(jar.parent_path());
+  EXPECT_TRUE(write_file(*bytes, jar));
+  return jar;
+}
+
+TEST_F(ViewerTest, UsesPackOfSettings) {
+  ::setenv("XDG_CONFIG_HOME", folder_.file("config").c_str(), 1);
+  const auto jar = install_client(folder_);
+  ViewerOptions given = options(320, 240);
+  given.file = write_house(folder_);
+  given.is_bare = false;
+  // Returns the image with the pack of the settings, which stay as they are.
+  const auto image_with = [&](const std::string& pack) {
+    Settings settings;
+    settings.pack = pack;
+    EXPECT_TRUE(write_settings(settings, settings_path()));
+    const Status status = run_viewer(given);
+    EXPECT_TRUE(status) << to_string(status.error());
+    EXPECT_EQ(read_settings(settings_path()).pack, pack);
+    const auto shot = read_png(given.screenshot);
+    return shot ? shot->rgb : std::vector<std::uint8_t>();
+  };
+  const auto own = image_with(kBuiltinPack);
+  const auto none = image_with(kNoPack);
+  const auto client = image_with(jar.string());
+  EXPECT_FALSE(client.empty());
+  EXPECT_NE(own, none);
+  EXPECT_NE(own, client);
+  EXPECT_NE(none, client);
+  EXPECT_EQ(image_with(folder_.file("absent.jar").string()), own) << "Quoin's own pack, with a warning";
+  // Packs of the command line have priority.
+  given.uses_own_packs = true;
+  given.load.packs = packs_for_images({jar});
+  EXPECT_EQ(image_with(kNoPack), client);
+  given.load.packs = {folder_.file("absent.jar")};
+  EXPECT_FALSE(run_viewer(given));
 }
 
 TEST_F(ViewerTest, OpensDroppedFile) {
@@ -232,6 +283,37 @@ TEST_F(ViewerTest, SavesImageOfJustChosenMode) {
                                               path_options(request, 320, 240, kPathSamples, scene.bounds()));
   ASSERT_TRUE(image);
   EXPECT_EQ(shot->rgb, develop(*image, develop_options(request)).value().rgb);
+}
+
+// The menu Blocks, with one client.
+TEST_F(ViewerTest, OffersInstalledClients) {
+  using std::chrono::milliseconds;
+  ::setenv("XDG_CONFIG_HOME", folder_.file("config").c_str(), 1);
+  const char* const home = std::getenv("HOME");
+  const std::string home_before = home == nullptr ? "" : home;
+  ::setenv("HOME", folder_.file("home").c_str(), 1);
+  const auto jar = install_client(folder_);
+  ViewerOptions given = options(640, 400);
+  given.file = write_house(folder_);
+  given.is_bare = false;
+  given.screenshot.clear();
+  // The menu and its item with the usual font, and with others.
+  constexpr std::array<std::array<int, 2>, 4> kPlaces{{{163, 88}, {163, 95}, {150, 85}, {180, 100}}};
+  std::size_t clicks = 0;
+  auto start = std::chrono::steady_clock::now();
+  const Deadline deadline;
+  const Status status = run_viewer(given, [&] {
+    if (!is_open("house.schem")) start = std::chrono::steady_clock::now();
+    const auto passed = std::chrono::steady_clock::now() - start;
+    if (clicks < 2 * kPlaces.size() && passed > milliseconds(300) * (clicks + 1)) {
+      const auto [x, y] = kPlaces.at(clicks / 2);
+      click(x, clicks++ % 2 == 0 ? 11 : y, 1);
+    }
+    return passed > milliseconds(300) * (2 * kPlaces.size() + 6) || deadline.is_over();
+  });
+  ::setenv("HOME", home_before.c_str(), 1);
+  ASSERT_TRUE(status) << to_string(status.error());
+  EXPECT_EQ(read_settings(settings_path()).pack, jar.string());
 }
 
 // SDL detects double clicks, however long frames take.

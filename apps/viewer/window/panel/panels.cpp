@@ -86,6 +86,44 @@ void draw_view_menu(const ViewState& state, MenuChoice& choice) {
   ImGui::EndMenu();
 }
 
+/// Returns the name of a pack in the menu: the version of an installed client, else its file name.
+std::string pack_label(const ViewState& state, const std::string& pack) {
+  if (state.clients) {
+    const auto same = [&](const InstalledClient& client) { return client.jar == pack; };
+    const auto found = std::ranges::find_if(*state.clients, same);
+    if (found != state.clients->end()) return "Minecraft " + found->version;
+  }
+  return std::filesystem::path(pack).filename().string();
+}
+
+/// Draws the menu of resource packs: none, Quoin's own, and installed clients, the newest first.
+void draw_pack_menu(ViewState& state, MenuChoice& choice) {
+  if (!ImGui::BeginMenu("Blocks")) return;
+  close_on_escape();
+  if (!state.clients) state.clients = find_clients(usual_client_folders());
+  const std::string& now = state.settings.pack;
+  const bool is_enabled = state.can_choose_pack();
+  bool has_current = state.has_named_packs;
+  const auto item = [&](const std::string& label, const std::string& pack) {
+    const bool is_current = !state.has_named_packs && now == pack;
+    has_current |= is_current;
+    if (ImGui::MenuItem(label.c_str(), nullptr, is_current, is_enabled)) choice.pack = pack;
+    if (pack != kBuiltinPack && pack != kNoPack && ImGui::IsItemHovered()) ImGui::SetTooltip("%s", pack.c_str());
+  };
+  if (state.has_named_packs) ImGui::MenuItem("As on the command line", nullptr, true, false);
+  item("Quoin's own pack", kBuiltinPack);
+  item("None", kNoPack);
+  ImGui::Separator();
+  for (const InstalledClient& client : *state.clients) item("Minecraft " + client.version, client.jar.string());
+  if (state.clients->empty()) ImGui::TextDisabled("no installed client of Minecraft found");
+  if (!has_current) item(pack_label(state, now), now);
+  if (state.open.document->world() != nullptr) {
+    ImGui::Separator();
+    ImGui::TextDisabled("this world stores its looks; a choice applies to the next file");
+  }
+  ImGui::EndMenu();
+}
+
 /// Returns the mode's label in the menu.
 const char* mode_name(DrawMode mode) {
   return info_of(static_cast<Command>(static_cast<int>(Command::DrawRays) + static_cast<int>(mode))).name;
@@ -139,6 +177,7 @@ float draw_menu(ViewState& state, MenuChoice& choice) {
   draw_file_menu(state, choice);
   draw_edit_menu(state, choice);
   draw_view_menu(state, choice);
+  draw_pack_menu(state, choice);
   if (ImGui::BeginMenu("Help")) {
     close_on_escape();
     menu_item(Command::Help, choice, true, state.is_help_shown);

@@ -15,6 +15,7 @@ struct MenuChoice {
   std::vector<Command> commands;
   std::optional<std::string> recent;  ///< recent file to open
   std::optional<Camera> camera;       ///< camera of the file to look through
+  std::optional<std::string> pack;    ///< Settings::pack to use
 };
 
 /// Draws the menu bar at the top. Returns its height in window units.
