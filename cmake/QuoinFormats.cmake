@@ -41,7 +41,7 @@ set(quoin_formats_off)
 set(quoin_sources_of_MESHES "/src/io/(gltf|three_mf)/|/src/io/triangles/(obj|off|ply|stl)\\.cpp$")
 set(quoin_sources_of_MODELS "/src/io/models/(binvox|cub|goxel|qubicle|voxlap)\\.cpp$")
 set(quoin_sources_of_GAME_WORLDS 
-  "/src/io/((minecraft|luanti)/|packs/(block_models|block_states|families|pack_[a-z]+|state_conditions)\\.cpp$)")
+  "/src/io/((minecraft|luanti)/|packs/(block_models|block_states|families|node_pack|(patterns/)?pack_[a-z]+|state_conditions)\\.cpp$)")
 set(quoin_sources_of_VOLUMES "/src/io/(vdb/|volume/(nifti|nrrd)\\.cpp$)")
 foreach(group IMAGES MESHES MODELS GAME_WORLDS VOLUMES)
   if(NOT QUOIN_WITH_${group})

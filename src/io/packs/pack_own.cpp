@@ -15,7 +15,7 @@
 #include "core/bytes/text.h"
 #include "io/image/image_codecs.h"
 #include "io/minecraft/block_looks.h"
-#include "io/packs/pack_patterns.h"
+#include "io/packs/patterns/pack_patterns.h"
 
 namespace quoin::packs {
 
@@ -95,8 +95,9 @@ void add_layer(const Pattern& pattern, Vec3 colour, float opacity, std::array<Ve
   }
 }
 
-/// Splits "assets/SPACE/FOLDER/NAME.END" into SPACE and NAME.
-std::optional<PackName> name_in(std::string_view path, std::string_view folder, std::string_view end) {
+}  // namespace
+
+std::optional<PackName> pack_file_name(std::string_view path, std::string_view folder, std::string_view end) {
   constexpr std::string_view kTop = "assets/";
   if (!path.starts_with(kTop) || !path.ends_with(end)) return std::nullopt;
   path = path.substr(kTop.size(), path.size() - kTop.size() - end.size());
@@ -105,6 +106,8 @@ std::optional<PackName> name_in(std::string_view path, std::string_view folder, 
   PackName name{std::string(path.substr(0, slash)), std::string(path.substr(slash + 1 + folder.size()))};
   return name.name.empty() ? std::nullopt : std::optional(std::move(name));
 }
+
+namespace {
 
 std::vector<std::byte> bytes_of(const std::string& text) {
   std::vector<std::byte> bytes(text.size());
@@ -203,11 +206,11 @@ Result<std::optional<std::vector<std::byte>>> OwnPack::read(std::string_view pat
   using Found = std::optional<std::vector<std::byte>>;
   if (!is_pack_path(path)) return Found();
   Found bytes;
-  if (const auto block = name_in(path, "blockstates/", ".json")) {
+  if (const auto block = pack_file_name(path, "blockstates/", ".json")) {
     bytes = bytes_of(families_.block_state(*block));
-  } else if (const auto model = name_in(path, "models/", ".json")) {
+  } else if (const auto model = pack_file_name(path, "models/", ".json")) {
     if (const auto text = families_.model(*model)) bytes = bytes_of(*text);
-  } else if (const auto texture = name_in(path, "textures/", ".png")) {
+  } else if (const auto texture = pack_file_name(path, "textures/", ".png")) {
     if (const auto image = recipes_.draw(*texture)) {
       auto png = encode_png(PngImage{kPatternSize, kPatternSize, 4, image->rgba}, PngEffort::Quick);
       if (!png) return png.error();

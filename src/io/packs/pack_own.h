@@ -16,6 +16,10 @@
 
 namespace quoin::packs {
 
+/// Splits "assets/SPACE/FOLDER/NAME.END" into SPACE and NAME; nullopt for other paths. `folder`: with '/' at its end.
+[[nodiscard]] std::optional<PackName> pack_file_name(std::string_view path, std::string_view folder,
+                                                     std::string_view end);
+
 /// Recipes of textures: layers of patterns (pack_patterns.h), each in the colour of a block or in a fixed colour.
 /// docs/formats/block_pack.md describes the table. Immutable after it was made.
 class TextureRecipes {

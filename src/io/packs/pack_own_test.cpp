@@ -15,7 +15,7 @@
 
 #include "io/minecraft/block_looks.h"
 #include "io/packs/families.h"
-#include "io/packs/pack_patterns.h"
+#include "io/packs/patterns/pack_patterns.h"
 
 namespace quoin::packs {
 namespace {

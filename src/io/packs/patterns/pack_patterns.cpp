@@ -1,4 +1,4 @@
-#include "io/packs/pack_patterns.h"
+#include "io/packs/patterns/pack_patterns.h"
 
 #include <algorithm>
 #include <iterator>

@@ -2,7 +2,7 @@
 #include <array>
 #include <iterator>
 
-#include "io/packs/pack_patterns.h"
+#include "io/packs/patterns/pack_patterns.h"
 
 // Patterns of plants, corals and fungi: cutouts that stand on the lower edge.
 

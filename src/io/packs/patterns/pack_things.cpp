@@ -3,7 +3,7 @@
 #include <iterator>
 #include <string_view>
 
-#include "io/packs/pack_patterns.h"
+#include "io/packs/patterns/pack_patterns.h"
 
 // Patterns of made things: doors, rails, machines, faces. Most are layers over a plain pattern.
 
