@@ -77,6 +77,7 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
   std::vector<std::uint32_t> materials;
   materials.reserve(nodes.size());
   for (const auto& node : nodes) materials.push_back(node ? builder.add_material(*node) : 0);
+  std::vector<std::pair<IVec3, std::uint32_t>> states;
   std::size_t at = 0;
   for (int z = 0; z < size_z; ++z) {
     for (int y = 0; y < size_y; ++y) {
@@ -89,11 +90,18 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
         if (version >= 2 && (version >= 4 ? chance & 0x7FU : chance >> 1) == 0) continue;
         if (!nodes[index]) continue;
         builder.use_material(materials[index]);
-        if (auto put = builder.put({x, y, size_z - 1 - z}, nodes[index]->colour); !put) return put.error();
+        const IVec3 voxel{x, y, size_z - 1 - z};
+        if (auto put = builder.put(voxel, nodes[index]->colour); !put) return put.error();
+        const auto state = node_state(names[index], std::to_integer<std::uint8_t>(content[3 * volume + at]));
+        if (state != 0) states.emplace_back(voxel, state);
       }
     }
   }
-  return builder.take("luanti");
+  auto loaded = builder.take("luanti");
+  if (!loaded || states.empty()) return loaded;
+  SceneGrid& grid = loaded->scene.edit(loaded->scene.grids().handles().front());
+  for (const auto& [voxel, state] : states) grid.grid.set_data(voxel, {.state = state});
+  return loaded;
 }
 
 }  // namespace
@@ -212,6 +220,10 @@ void set_passage(std::string_view name, VoxelProperties& type) {
   if (type.visibility == Visibility::Opaque) type.blocks_light = false;
 }
 
+bool is_flowing(std::string_view name) {
+  return name.ends_with("_flowing");
+}
+
 }  // namespace
 
 std::optional<VoxelProperties> node_properties(std::string_view name) {
@@ -226,7 +238,14 @@ std::optional<VoxelProperties> node_properties(std::string_view name) {
   if (look.knowledge != Knowledge::Table) {
     type.attributes[kNodeGuessAttribute] = look.knowledge == Knowledge::Words ? "words" : "nothing";
   }
+  type.state_bits = 8;
+  type.attributes[kNodeStatesAttribute] = is_flowing(name) ? "drop:n3,falls:b1,rest:n4" : "param2:n8";
   return type;
+}
+
+std::uint32_t node_state(std::string_view name, std::uint8_t param2) {
+  constexpr std::uint32_t kLevel = 7;
+  return is_flowing(name) ? param2 ^ kLevel : param2;
 }
 
 }  // namespace quoin::models

@@ -24,7 +24,15 @@ inline constexpr const char* kNodeGuessAttribute = "luanti.look";
 
 /// Returns the type of a Luanti node by its name ("default:stone"): from a table for the names of Luanti's own game,
 /// otherwise by the words of the name. Returns nullopt for "air" and for "ignore" (not generated).
+/// Its attribute kNodeStatesAttribute lists the fields of `node_state`.
 [[nodiscard]] std::optional<VoxelProperties> node_properties(std::string_view name);
+
+/// The attribute of a node's type that lists the fields of its state bits.
+inline constexpr const char* kNodeStatesAttribute = "luanti.states";
+
+/// Returns the state of a node: its param2. The level of a flowing liquid (the lowest 3 bits, 7 is the highest) becomes
+/// its drop below the source, as in ShapeNeighbours::Fluid.
+[[nodiscard]] std::uint32_t node_state(std::string_view name, std::uint8_t param2);
 
 }  // namespace quoin::models
 

@@ -36,7 +36,6 @@ constexpr int kHighestBlock = 2048;  // the first invalid coordinate
 constexpr int kChunksOfPart = 8;
 /// Size limit of a row. Luanti's rows have a few kilobytes; a larger zlib stream could expand to gigabytes.
 constexpr std::size_t kMaxRow = std::size_t{16} << 20;
-constexpr const char* kStatesAttribute = "luanti.states";
 
 /// The table's form of block positions: one number, or three columns since version 5.12.
 enum class Places : std::uint8_t { Number, Three };
@@ -185,8 +184,6 @@ class NodeTypes {
     const std::unique_lock lock(mutex_);
     VoxelType type = kAir;
     if (properties) {
-      properties->state_bits = 8;
-      properties->attributes[kStatesAttribute] = "param2:n8";
       const auto added = types_.find_or_add(*properties);
       if (!added) return added.error();
       type = *added;
@@ -230,7 +227,8 @@ class ChunkBuilder {
       const auto node = static_cast<int>(i);
       const IVec3 at = corner + IVec3{node & 15, node >> 4 & 15, kBlockEdge - 1 - (node >> 8)};
       voxels_[static_cast<std::size_t>((at.z * kChunkEdge + at.y) * kChunkEdge + at.x)] = type;
-      if (block.param2[i] != 0) states_.emplace_back(at, block.param2[i]);
+      const std::uint32_t state = models::node_state(block.names[block.nodes[i]], block.param2[i]);
+      if (state != 0) states_.emplace_back(at, state);
     }
     return {};
   }

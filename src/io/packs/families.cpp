@@ -356,6 +356,26 @@ struct BlockFamilies::Parser {
     }
   }
 
+  /// Parses "turn", "fluid" and "joins" of a family.
+  Status trait(const std::string& key, const std::string& value, Traits& traits) const {
+    constexpr std::array<std::string_view, 3> kTurns = {"4dir", "facedir", "wallmounted"};
+    constexpr std::array<std::string_view, 2> kFluids = {"source", "flowing"};
+    // The bits of the own pack's blocks come first: pack_looks.cpp.
+    constexpr std::array<std::string_view, 7> kGroups = {"fence", "pane", "rail", "powder", "water", "river", "lava"};
+    constexpr unsigned kFirstGroup = 8;
+    const auto is_one_of = [&](const auto& names) { return std::ranges::find(names, value) != names.end(); };
+    if (key == "turn" && is_one_of(kTurns)) {
+      traits.turn = value;
+    } else if (key == "fluid" && is_one_of(kFluids)) {
+      traits.fluid = value;
+    } else if (key == "joins" && is_one_of(kGroups)) {
+      traits.groups = 1U << (kFirstGroup + static_cast<unsigned>(std::ranges::find(kGroups, value) - kGroups.begin()));
+    } else {
+      return fault("unknown " + key + " " + value);
+    }
+    return {};
+  }
+
   Status family(const std::string& name, const Json& json) {
     context = "family " + name;
     if (!json.is_object()) return fault("must be an object");
@@ -371,6 +391,10 @@ struct BlockFamilies::Parser {
         }
       } else if (key == "full" && value.is_boolean()) {
         made.is_full = value.get<bool>();
+      } else if (key == "joins_full" && value.is_boolean()) {
+        made.traits.joins_full_sides = value.get<bool>();
+      } else if ((key == "turn" || key == "fluid" || key == "joins") && value.is_string()) {
+        if (auto status = trait(key, value.get<std::string>(), made.traits); !status) return status;
       } else if (key != "states" && key != "parts") {
         return fault("unknown key " + key);
       }
@@ -419,8 +443,10 @@ struct BlockFamilies::Parser {
   }
 };
 
-Result<BlockFamilies> BlockFamilies::from_text(std::string_view families, std::string_view rules) {
+Result<BlockFamilies> BlockFamilies::from_text(std::string_view families, std::string_view rules,
+                                               std::string_view texture_space) {
   BlockFamilies made;
+  made.texture_space_ = texture_space;
   Parser parser{made, {}};
   const Json tables = Json::parse(families, nullptr, false);
   const Json rows = Json::parse(rules, nullptr, false);
@@ -449,11 +475,12 @@ Result<BlockFamilies> BlockFamilies::from_text(std::string_view families, std::s
 }
 
 BlockFamilies::Found BlockFamilies::find(const PackName& block, int depth) const {
-  auto match = names_.find(block.name);
+  auto match = names_.find(texture_space_.empty() ? block.name : block.space + ":" + block.name);
   QUOIN_ASSERT(match, "a rule for all names");
   const Rule& rule = rules_[match->row];
   if (rule.family.starts_with('=')) {
-    const PackName other{block.space, filled(rule.family.substr(1), block, match->stars)};
+    const std::string name = filled(rule.family.substr(1), block, match->stars);
+    const PackName other = texture_space_.empty() ? PackName{block.space, name} : pack_name(name);
     if (depth < kMaxAliases) return find(other, depth + 1);
     match->row = names_.find("?")->row;
   }
@@ -462,21 +489,33 @@ BlockFamilies::Found BlockFamilies::find(const PackName& block, int depth) const
           match->is_exact};
 }
 
+/// Returns the blocks that may be the material of a block, the likeliest first, and whether only a rule of this name
+/// counts.
+std::vector<std::pair<PackName, bool>> BlockFamilies::materials(const Found& found) const {
+  const std::string& space = found.block.space;
+  const std::string base = found.stars.empty() ? found.block.name : found.stars[0];
+  if (texture_space_.empty()) {
+    // Bamboo has planks and a block, quartz only a block; other names may be woods of mods.
+    return {{{space, base}, false},
+            {{space, base + "s"}, false},
+            {{space, base + "_planks"}, true},
+            {{space, base + "_block"}, false},
+            {{space, base + "_planks"}, false}};
+  }
+  // The last star is the name of a material, of the game's own mods or of the same mod.
+  const std::string& name = found.stars.empty() ? found.block.name : found.stars.back();
+  return {{{"default", name}, false}, {{"farming", name}, true}, {{space, name}, false}};
+}
+
 std::string BlockFamilies::texture_of_material(const Found& found, std::string_view side) const {
   static const std::map<std::string_view, std::vector<std::string_view>> known_variables = {
       {"top", {"top", "end", "all", "side"}},
       {"bottom", {"bottom", "end", "top", "all", "side"}},
       {"side", {"side", "all", "front"}},
   };
-  const std::string base = found.stars.empty() ? found.block.name : found.stars[0];
-  // Bamboo has planks and a block, quartz only a block; other names may be woods of mods.
-  const std::array<std::pair<std::string, bool>, 5> candidates = {{{base, false},
-                                                                   {base + "s", false},
-                                                                   {base + "_planks", true},
-                                                                   {base + "_block", false},
-                                                                   {base + "_planks", false}}};
+  const std::vector<std::pair<PackName, bool>> candidates = materials(found);
   for (const auto& [name, is_listed] : candidates) {
-    const Found material = find({found.block.space, name});
+    const Found material = find(name);
     if (material.is_fallback || !material.family->is_full || (is_listed && !material.is_exact)) continue;
     const auto variables = known_variables.find(side);
     for (const std::string_view variable :
@@ -486,7 +525,9 @@ std::string BlockFamilies::texture_of_material(const Found& found, std::string_v
       }
     }
   }
-  return "quoin:block/" + found.block.space + "/" + base + "_planks";
+  const PackName& last = candidates.back().first;
+  return texture_space_.empty() ? "quoin:block/" + last.space + "/" + last.name
+                                : texture_space_ + ":block/" + last.space + "_" + last.name;
 }
 
 std::string BlockFamilies::texture(const Found& found, const std::string& text) const {
@@ -494,7 +535,8 @@ std::string BlockFamilies::texture(const Found& found, const std::string& text) 
   const PackName named = pack_name(filled(text, found.block, found.stars));
   const bool has_space = text.find(':') != std::string::npos;
   const bool has_folder = named.name.starts_with("block/") || named.name.starts_with("entity/");
-  return (has_space ? named.space : found.block.space) + ":" + (has_folder ? "" : "block/") + named.name;
+  const std::string& space = texture_space_.empty() ? found.block.space : texture_space_;
+  return (has_space ? named.space : space) + ":" + (has_folder ? "" : "block/") + named.name;
 }
 
 std::string BlockFamilies::model_name(const PackName& block, const Found& found, const std::string& end) const {
@@ -594,6 +636,13 @@ std::optional<std::string> BlockFamilies::model(const PackName& model) const {
   const auto parent = models_.find(block.name);
   if (block.space != "minecraft" || is_fallback || parent == models_.end()) return std::nullopt;
   return model_json(parent->second, {}, {});
+}
+
+BlockFamilies::Traits BlockFamilies::traits(const PackName& block) const {
+  const Found found = find(block);
+  Traits traits = found.family->traits;
+  traits.is_fallback = found.is_fallback;
+  return traits;
 }
 
 std::string BlockFamilies::family(const PackName& block) const {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -62,16 +63,27 @@ class NamePatterns {
 /// The tables of families, and the rules that assign them to names. Immutable after it was made.
 class BlockFamilies {
  public:
-  /// Parses both tables.
+  /// Parses both tables. `texture_space`: not empty for tables of another game, whose patterns match names with their
+  /// namespace ("stairs:stair_*") and whose textures have this namespace by default.
   ///
   /// Errors: BadFormat, naming the family, model or rule, for invalid JSON, unknown keys, models, families or options,
   ///         numbers outside the published format, and lists beyond their limits.
-  [[nodiscard]] static Result<BlockFamilies> from_text(std::string_view families, std::string_view rules);
+  [[nodiscard]] static Result<BlockFamilies> from_text(std::string_view families, std::string_view rules,
+                                                       std::string_view texture_space = {});
 
   /// Returns the block-state file of a block as JSON. Every name has one.
   [[nodiscard]] std::string block_state(const PackName& block) const;
   /// Returns a model file as JSON; nullopt if no block state refers to it and it is no published parent.
   [[nodiscard]] std::optional<std::string> model(const PackName& model) const;
+  /// The properties of a family that block-state files cannot have.
+  struct Traits {
+    std::string turn;          ///< the rule by which a number in the state turns the block; empty: none
+    std::string fluid;         ///< "source" or "flowing"; empty: no fluid
+    std::uint32_t groups = 0;  ///< bits of the groups whose blocks join each other (ShapeRules::groups); 0: joins none
+    bool joins_full_sides = false;
+    bool is_fallback = false;  ///< the rule for all names
+  };
+  [[nodiscard]] Traits traits(const PackName& block) const;
   /// Returns the name of the family.
   [[nodiscard]] std::string family(const PackName& block) const;
   /// Returns true if a rule other than the last one, which makes cubes of all names, matches.
@@ -108,6 +120,7 @@ class BlockFamilies {
     std::vector<State> states;
     bool has_parts = false;
     bool is_full = false;
+    Traits traits{};
   };
   struct Rule {
     std::string family;  // or, after '=', the name whose rule is meant
@@ -127,6 +140,7 @@ class BlockFamilies {
   [[nodiscard]] Found find(const PackName& block, int depth = 0) const;
   [[nodiscard]] std::string texture(const Found& found, const std::string& text) const;
   [[nodiscard]] std::string texture_of_material(const Found& found, std::string_view side) const;
+  [[nodiscard]] std::vector<std::pair<PackName, bool>> materials(const Found& found) const;
   [[nodiscard]] std::string model_name(const PackName& block, const Found& found, const std::string& end) const;
   [[nodiscard]] std::string model_json(const std::vector<Box>& boxes,
                                        const std::vector<std::pair<std::string, std::string>>& textures,
@@ -136,6 +150,7 @@ class BlockFamilies {
   std::map<std::string, Family> families_;
   std::vector<Rule> rules_;
   NamePatterns names_;
+  std::string texture_space_;  // see from_text
 };
 
 }  // namespace quoin::packs

@@ -13,6 +13,7 @@
 #include "core/bytes/files.h"
 #include "core/bytes/text.h"
 #include "core/rows/packed_row.h"
+#include "io/packs/node_pack.h"
 #include "io/zip.h"
 
 namespace quoin::packs {
@@ -134,18 +135,23 @@ Result<std::shared_ptr<const ZipPack>> open_zip_pack(const fs::path& path) {
 }
 
 Error no_assets(const fs::path& folder) {
-  return make_error(ErrorCode::InvalidArgument, "not a resource pack: the folder has no folder assets",
+  return make_error(ErrorCode::InvalidArgument,
+                    "not a resource pack: the folder has no folder assets, and is no Luanti game or mod",
                     folder.string());
 }
 
+// Of the files below `assets`, or of the images of a Luanti game, mod or texture pack.
 Result<FileSums> sums_of_folder(const fs::path& folder) {
   FileSums sums;
+  std::error_code missing;
+  const bool has_assets = fs::is_directory(folder / "assets", missing);
+  if (!has_assets && !is_node_folder(folder)) return no_assets(folder);
   std::size_t entries = 0;
   std::uint64_t bytes = 0;
   std::error_code error;
   constexpr auto kOptions = fs::directory_options::follow_directory_symlink;
-  for (fs::recursive_directory_iterator at(folder / "assets", kOptions, error), end; !error && at != end;
-       at.increment(error)) {
+  for (fs::recursive_directory_iterator at(has_assets ? folder / "assets" : folder, kOptions, error), end;
+       !error && at != end; at.increment(error)) {
     if (++entries > kMaxEntries) {
       return make_error(ErrorCode::LimitExceeded,
                         "the folder has more than " + std::to_string(kMaxEntries) + " files and folders",
@@ -155,7 +161,8 @@ Result<FileSums> sums_of_folder(const fs::path& folder) {
     std::error_code unknown;
     if (!is_pack_path(path)) {
       at.disable_recursion_pending();
-    } else if (at->is_regular_file(unknown) && at->file_size(unknown) <= kMaxImageBytes) {
+    } else if ((has_assets || path.ends_with(".png")) && at->is_regular_file(unknown) &&
+               at->file_size(unknown) <= kMaxImageBytes) {
       const auto content = read_file(at->path());
       if (!content) return content.error();
       bytes += content->size();
@@ -186,8 +193,10 @@ bool is_pack_path(std::string_view path) {
 Result<std::shared_ptr<const PackFiles>> open_pack(const fs::path& path) {
   std::error_code error;
   if (fs::is_directory(path, error)) {
-    if (!fs::is_directory(path / "assets", error)) return no_assets(path);
-    return std::shared_ptr<const PackFiles>(std::make_shared<FolderPack>(path));
+    if (fs::is_directory(path / "assets", error)) {
+      return std::shared_ptr<const PackFiles>(std::make_shared<FolderPack>(path));
+    }
+    return is_node_folder(path) ? open_node_folder(path) : no_assets(path);
   }
   auto pack = open_zip_pack(path);
   if (!pack) return pack.error();
@@ -204,7 +213,6 @@ Result<std::uint64_t> hash_of_files(const fs::path& path) {
   FileSums sums;
   std::error_code error;
   if (fs::is_directory(path, error)) {
-    if (!fs::is_directory(path / "assets", error)) return no_assets(path);
     auto found = sums_of_folder(path);
     if (!found) return found.error();
     sums = std::move(*found);
@@ -251,6 +259,10 @@ Result<std::shared_ptr<const PackStack>> PackStack::open(std::span<const fs::pat
     packs.push_back(std::move(*pack));
   }
   return std::make_shared<const PackStack>(std::move(packs));
+}
+
+bool PackStack::has_tiles() const {
+  return std::ranges::any_of(packs_, [](const auto& pack) { return pack->has_tiles(); });
 }
 
 Result<FileBytes> PackStack::read(std::string_view path, std::size_t max_bytes) const {

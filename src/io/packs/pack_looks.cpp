@@ -13,8 +13,11 @@
 #include <quoin/core/assert.h>
 
 #include "core/bytes/text.h"
+#include "io/luanti/luanti.h"
 #include "io/minecraft/block_looks.h"
 #include "io/minecraft/block_types.h"
+#include "io/packs/node_pack.h"
+#include "io/packs/pack_own.h"
 #include "io/packs/pack_shapes.h"
 #include "io/packs/state_conditions.h"
 
@@ -130,16 +133,25 @@ Result<std::shared_ptr<const BlockStates>> PackLibrary::states_of(const std::str
   return remember(std::make_shared<const BlockStates>(std::move(*parsed)));
 }
 
+/// A library that may have the look of a type, and the block whose look it is.
+struct BlockLooks::Source {
+  PackLibrary* library = nullptr;
+  TypeStates states;
+  BlockFamilies::Traits node{};  ///< of Luanti nodes
+  bool is_named = false;         ///< replaces the looks of an earlier conversion
+};
+
 /// Makes the look of one type from one library.
 class BlockLooks::Maker {
  public:
-  Maker(BlockLooks& looks, PackLibrary& library, const VoxelProperties& type)
+  Maker(BlockLooks& looks, Source source, const VoxelProperties& type)
       : looks_(looks),
-        library_(library),
+        library_(*source.library),
         type_(type),
-        states_(type),
+        states_(std::move(source.states)),
+        node_(std::move(source.node)),
         name_(without_space(states_.block())),
-        is_own_(looks.own_library_ && &library == &*looks.own_library_) {}
+        is_own_(looks.own_library_ && &library_ == &*looks.own_library_) {}
 
   /// Returns the type with its look; nullopt if the library has none. Errors: of files, with their path.
   Result<std::optional<VoxelProperties>> make() {
@@ -154,6 +166,7 @@ class BlockLooks::Maker {
     // The game draws models without elements by code.
     std::erase_if(outcomes_, [](const Outcome& each) { return each.model->elements.empty(); });
     if (outcomes_.empty()) return std::optional<VoxelProperties>();
+    if (!node_.fluid.empty()) return make_node_fluid();
     const auto is_textured = [&](const Outcome& outcome) {
       return std::ranges::any_of(outcome.model->elements, [&](const PackElement& element) {
         return std::ranges::any_of(
@@ -217,6 +230,29 @@ class BlockLooks::Maker {
     made.shapes = std::move(*shapes);
     settle(made);
     return made;
+  }
+
+  /// Makes a liquid of Luanti. The importer turned levels of flowing liquids around (docs/formats/luanti.md); maps that
+  /// were converted before have whole cubes.
+  Result<std::optional<VoxelProperties>> make_node_fluid() {
+    const auto look = [&](const char* variable) {
+      VoxelFace face{.tint = {type_.colour.r, type_.colour.g, type_.colour.b}};
+      const PackTexture* const found = texture_of_face(*outcomes_.front().model, {.texture = variable});
+      if (found != nullptr) face = {.texture = found->texture, .alpha = found->alpha};
+      return face;
+    };
+    const VoxelFace top = look("#still");
+    VoxelProperties made = type_;
+    if (!top.texture.is_null()) made.faces = VoxelFaces(look("#flow"), top, top);
+    const auto states = type_.attributes.find(models::kNodeStatesAttribute);
+    if (node_.fluid == "source" || (states != type_.attributes.end() && states->second.starts_with("drop:"))) {
+      auto shapes = VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid, .groups = node_.groups});
+      if (!shapes) return shapes.error();
+      made.shapes = std::move(*shapes);
+    }
+    has_textures_ = !made.faces.empty();
+    settle(made);
+    return std::optional(std::move(made));
   }
 
   /// Fills `outcomes_`: models without cases that cannot hold, equal ones once.
@@ -340,6 +376,7 @@ class BlockLooks::Maker {
 
   /// Returns the orientations of outcomes that are one model; nullopt if the bits that select them lie too far apart.
   [[nodiscard]] std::optional<StateOrientations> orientations() const {
+    if (!node_.turn.empty()) return node_orientations(node_.turn);
     StateOrientations made;
     if (outcomes_.size() == 1) {
       const AxisOrientation turn = remaining_turn(outcomes_.front());
@@ -407,8 +444,8 @@ class BlockLooks::Maker {
     ShapeRules rules;
     if (states_.connects()) {
       rules.neighbours = ShapeNeighbours::Connected;
-      rules.groups = joined_group(name_);
-      rules.connects_to_full_sides = name_ != "redstone_wire";
+      rules.groups = node_.groups != 0 ? node_.groups : joined_group(name_);
+      rules.connects_to_full_sides = node_.groups != 0 ? node_.joins_full_sides : name_ != "redstone_wire";
     }
     std::vector<std::vector<ShapeElement>> all;
     if (states_.has_corners() && follows_corners()) {
@@ -428,6 +465,7 @@ class BlockLooks::Maker {
       }
       if (auto done = add_parts(merged, all.back(), {}, rules); !done) return done.error();
     } else {
+      if (!node_.turn.empty()) made.orientations = node_orientations(node_.turn);
       for (const Outcome& outcome : outcomes_) {
         all.push_back(elements(outcome));
         if (auto done = add_parts(outcome, all.back(), remaining_turn(outcome), rules); !done) return done.error();
@@ -559,12 +597,14 @@ class BlockLooks::Maker {
     // Shapes stop light by their sides.
     if (is_opaque && !made.shapes.empty()) made.blocks_light = std::nullopt;
     made.attributes.erase(minecraft::kGuessAttribute);
+    if (!node_.is_fallback) made.attributes.erase(models::kNodeGuessAttribute);
   }
 
   BlockLooks& looks_;
   PackLibrary& library_;
   const VoxelProperties& type_;
   TypeStates states_;
+  BlockFamilies::Traits node_;
   std::string_view name_;
   bool is_own_ = false;
   bool is_multipart_ = false;
@@ -572,14 +612,63 @@ class BlockLooks::Maker {
   std::vector<Outcome> outcomes_;
 };
 
+namespace {
+
+/// Returns the packs that are not null, the lowest first, as one.
+std::shared_ptr<const PackFiles> stacked(std::vector<std::shared_ptr<const PackFiles>> packs) {
+  std::erase(packs, nullptr);
+  return packs.size() == 1 ? packs.front() : std::make_shared<PackStack>(std::move(packs));
+}
+
+/// Returns the fields of a node's param2 that families name. They overlap: the family of a node uses one of them.
+std::vector<minecraft::StateField> param2_fields() {
+  return {{"wallmounted", 'n', 0, 3}, {"style", 'n', 0, 3}, {"facedir", 'n', 0, 5}};
+}
+
+}  // namespace
+
+std::vector<BlockLooks::Source> BlockLooks::sources_of_node(const VoxelProperties& type) {
+  std::vector<Source> sources;
+  const PackName name = pack_name(type.name);
+  const BlockFamilies::Traits traits = NodePack::families().traits(name);
+  const TypeStates states(type.name, param2_fields(), traits.groups != 0);
+  const std::string tile = name.space + "_" + name.name;
+  const auto has_tile = [&](const char* end) {
+    const auto found = packs_->read(tile_path(tile + end), kMaxImageBytes);
+    return found && *found;
+  };
+  sources.push_back({&library_, states, traits, true});
+  // A node that only the rule for all names knows, and whose texture no folder has, may have the name of a block.
+  const bool is_block = traits.is_fallback && own_library_ && !name.name.empty() &&
+                        OwnPack::instance()->families().is_known({"minecraft", name.name}) &&
+                        !(packs_->has_tiles() && (has_tile("") || has_tile("_top") || has_tile("_side")));
+  if (is_block) {
+    BlockFamilies::Traits guessed;
+    guessed.is_fallback = true;
+    sources.push_back({&*own_library_, TypeStates("minecraft:" + name.name, {}, false), guessed, false});
+  }
+  if (node_library_) sources.push_back({&*node_library_, states, traits, packs_->has_tiles()});
+  return sources;
+}
+
+std::vector<BlockLooks::Source> BlockLooks::sources_of(const VoxelProperties& type) {
+  if (!type.attributes.contains(minecraft::kStatesAttribute)) return sources_of_node(type);
+  std::vector<Source> sources;
+  sources.push_back({&library_, TypeStates(type), {}, true});
+  if (own_library_) sources.push_back({&*own_library_, TypeStates(type), {}, false});
+  return sources;
+}
+
 BlockLooks::BlockLooks(std::shared_ptr<const PackFiles> packs, std::shared_ptr<const PackFiles> own)
     : packs_(std::move(packs)),
       own_(std::move(own)),
-      all_(own_ == nullptr ? packs_
-                           : std::make_shared<PackStack>(std::vector<std::shared_ptr<const PackFiles>>{own_, packs_})),
+      nodes_(own_ != nullptr || packs_->has_tiles() ? std::make_shared<NodePack>(own_ != nullptr) : nullptr),
+      all_(stacked({own_, packs_})),
+      textured_(stacked({own_, nodes_, packs_})),
       library_(*packs_, *all_),
-      textures_(*all_) {
+      textures_(*textured_) {
   if (own_ != nullptr) own_library_.emplace(*own_, *own_);
+  if (nodes_ != nullptr) node_library_.emplace(*nodes_, *nodes_);
 }
 
 void BlockLooks::note(std::string name, const std::string& reason) {
@@ -588,17 +677,19 @@ void BlockLooks::note(std::string name, const std::string& reason) {
 }
 
 VoxelProperties BlockLooks::applied(const VoxelProperties& type) {
-  if (!type.attributes.contains(minecraft::kStatesAttribute)) return type;
+  if (!type.attributes.contains(minecraft::kStatesAttribute) &&
+      !type.attributes.contains(models::kNodeStatesAttribute)) {
+    return type;
+  }
   const std::scoped_lock lock(mutex_);
   ++report_.types;
   std::string reason = "not in the packs";
   bool is_damaged = false;  // the look of a named pack
-  for (PackLibrary* const library : {&library_, own_library_ ? &*own_library_ : nullptr}) {
-    if (library == nullptr) continue;
+  for (Source& source : sources_of(type)) {
     // A world that was converted with a pack keeps its looks.
-    if (library != &library_ && (!type.faces.empty() || !type.shapes.empty())) return type;
+    if (!source.is_named && (!type.faces.empty() || !type.shapes.empty())) return type;
     const std::size_t refused = textures_.refused_blends();
-    auto made = Maker(*this, *library, type).make();
+    auto made = Maker(*this, std::move(source), type).make();
     if (!made) {
       reason = to_string(made.error());
       is_damaged = true;

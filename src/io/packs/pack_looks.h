@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include <quoin/core/result.h>
 #include <quoin/grid/voxel_registry.h>
@@ -13,6 +14,7 @@
 
 #include "io/packs/block_models.h"
 #include "io/packs/block_states.h"
+#include "io/packs/families.h"
 #include "io/packs/pack_files.h"
 #include "io/packs/pack_textures.h"
 
@@ -40,20 +42,26 @@ class BlockLooks {
   /// `own`: used for blocks without a model with elements in `packs`, also for textures; null if there is none.
   explicit BlockLooks(std::shared_ptr<const PackFiles> packs, std::shared_ptr<const PackFiles> own = nullptr);
 
-  /// Returns a type with its look; unchanged if it is no Minecraft block or no look is found.
+  /// Returns a type with its look; unchanged if it is neither a Minecraft block nor a Luanti node, or no look is found.
   [[nodiscard]] VoxelProperties applied(const VoxelProperties& type);
   [[nodiscard]] BlockPackReport report() const;
 
  private:
   class Maker;
+  struct Source;
+  [[nodiscard]] std::vector<Source> sources_of(const VoxelProperties& type);
+  [[nodiscard]] std::vector<Source> sources_of_node(const VoxelProperties& type);
   void note(std::string name, const std::string& reason);
 
   std::shared_ptr<const PackFiles> packs_;
   std::shared_ptr<const PackFiles> own_;
-  std::shared_ptr<const PackFiles> all_;  // for textures
+  std::shared_ptr<const PackFiles> nodes_;  // the tables of Luanti nodes; null without a pack that shows nodes
+  std::shared_ptr<const PackFiles> all_;    // for models
+  std::shared_ptr<const PackFiles> textured_;
   mutable std::mutex mutex_;
   PackLibrary library_;
   std::optional<PackLibrary> own_library_;
+  std::optional<PackLibrary> node_library_;
   TextureReader textures_;
   std::set<std::string> missing_;  // textures, and models after a blank
   BlockPackReport report_;

@@ -28,6 +28,10 @@ class TypeStates {
  public:
   /// Reads the name and the fields of a type. Requires: the type has the attribute kStatesAttribute.
   explicit TypeStates(const VoxelProperties& type);
+  /// Creates the properties of a block of another format: its fields, which may overlap. `connects`: its sides follow
+  /// its neighbours.
+  TypeStates(std::string block, std::vector<minecraft::StateField> fields, bool connects)
+      : block_(std::move(block)), fields_(std::move(fields)), connects_(connects) {}
 
   /// Returns the name without properties: "minecraft:oak_stairs"; empty if it cannot be parsed.
   [[nodiscard]] const std::string& block() const { return block_; }

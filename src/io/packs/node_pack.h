@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <quoin/core/result.h>
+#include <quoin/grid/voxel_shape.h>
+
+#include "io/packs/families.h"
+#include "io/packs/pack_files.h"
+
+// The looks of Luanti nodes: shapes by node name from tables, in the form of a resource pack, and textures of a game's
+// or mod's folder. Node definitions are programs (Lua), so names are all that a map tells about a node.
+// docs/formats/luanti.md describes the tables.
+
+namespace quoin::packs {
+
+/// Returns the path of a tile ("default_stone.png") as a file of a pack: assets/luanti/textures/block/NAME.png.
+[[nodiscard]] std::string tile_path(std::string_view name);
+
+/// Returns the orientations that `param2` selects: "facedir" (24 of 32 values), "4dir", or "wallmounted" (the
+/// direction of the wall); empty for other texts. They turn nodes in the axes of grids, where z is mirrored.
+/// Source: Luanti's doc/lua_api.md, "Node paramtypes", and the wall directions in src/mapnode.cpp.
+[[nodiscard]] StateOrientations node_orientations(std::string_view turn);
+
+/// The block states, models and textures of all nodes, made when they are read. Tables are parsed at the first use.
+class NodePack final : public PackFiles {
+ public:
+  /// `draws_tiles`: the pack has textures, in the colours of the table of nodes (models::node_properties).
+  explicit NodePack(bool draws_tiles) : draws_tiles_(draws_tiles) {}
+
+  [[nodiscard]] Result<std::optional<std::vector<std::byte>>> read(std::string_view path,
+                                                                   std::size_t max_bytes) const override;
+  /// The tables of families and rules, by full node names.
+  [[nodiscard]] static const BlockFamilies& families();
+
+ private:
+  bool draws_tiles_;
+};
+
+/// Returns true for a folder of a Luanti game, mod, modpack or texture pack: it has game.conf, mod.conf, modpack.conf,
+/// modpack.txt, texture_pack.conf, init.lua, or a folder `mods` or `textures`.
+[[nodiscard]] bool is_node_folder(const std::filesystem::path& folder);
+
+/// Opens the PNG files in all folders `textures` of such a folder, or in the whole folder of a texture pack, by their
+/// names, as tiles (tile_path). Of equal names, the path that sorts last wins. A tile that is missing with the end
+/// "_top", "_bottom", "_side" or "_front" is the one without it. Tiles of frames below each other have an animation.
+/// Errors: CannotRead; LimitExceeded beyond 100,000 files. Depth: folders below 8 levels are not searched.
+[[nodiscard]] Result<std::shared_ptr<const PackFiles>> open_node_folder(const std::filesystem::path& folder);
+
+}  // namespace quoin::packs
