@@ -45,28 +45,28 @@ constexpr FormatGroup kVolumes{"QUOIN_WITH_VOLUMES"};
 // The formats of this layer, one row each. Adding a format: a folder with a FormatDriver, and a row here. Rows of a
 // group repeat the format and its extensions, for builds without it; cmake/QuoinFormats.cmake lists its sources.
 // Weak detection comes late: the first driver that accepts a file's beginning gets it.
-#define QUOIN_FORMATS(ROW, GROUPED)                                                                     \
-  ROW(kVoxFormat)                                                                                       \
-  ROW(kSceneFormat)                                                                                     \
-  GROUPED(kGameWorlds, kMinecraftFormat, FileFormat::Minecraft, ".mca", "")                             \
-  GROUPED(kGameWorlds, kSchematicFormat, FileFormat::Schematic, ".schem", ".schematic .litematic .nbt") \
-  GROUPED(kModels, kQubicleFormat, FileFormat::Qubicle, ".qb", ".qbt .qbcl .qef")                       \
-  GROUPED(kModels, kGoxelFormat, FileFormat::Goxel, ".gox", "")                                         \
-  GROUPED(kModels, kVoxlapFormat, FileFormat::Voxlap, ".vxl", ".kv6 .kvx")                              \
-  GROUPED(kModels, kBinvoxFormat, FileFormat::Binvox, ".binvox", "")                                    \
-  GROUPED(kModels, kCubeWorldFormat, FileFormat::CubeWorld, ".cub", "")                                 \
-  GROUPED(kGameWorlds, kLuantiSchematicFormat, FileFormat::LuantiSchematic, ".mts", "")                 \
-  ROW(kHeightsFormat)                                                                                   \
-  GROUPED(kVolumes, kVdbFormat, FileFormat::Vdb, ".vdb", ".nvdb")                                       \
-  GROUPED(kVolumes, kNiftiFormat, FileFormat::Nifti, ".nii", "")                                        \
-  GROUPED(kVolumes, kNrrdFormat, FileFormat::Nrrd, ".nrrd", ".nhdr")                                    \
-  GROUPED(kMeshes, kGlbFormat, FileFormat::Glb, ".glb", "")                                             \
-  GROUPED(kMeshes, kGltfFormat, FileFormat::Gltf, ".gltf", "")                                          \
-  GROUPED(kMeshes, kPlyFormat, FileFormat::Ply, ".ply", "")                                             \
-  GROUPED(kMeshes, kStlFormat, FileFormat::Stl, ".stl", "")                                             \
-  GROUPED(kMeshes, kThreeMfFormat, FileFormat::ThreeMf, ".3mf", "")                                     \
-  GROUPED(kMeshes, kOffFormat, FileFormat::Off, ".off", "")                                             \
-  GROUPED(kMeshes, kObjFormat, FileFormat::Obj, ".obj", "")                                             \
+#define QUOIN_FORMATS(ROW, GROUPED)                                                                                  \
+  ROW(kVoxFormat)                                                                                                    \
+  ROW(kSceneFormat)                                                                                                  \
+  GROUPED(kGameWorlds, kMinecraftFormat, FileFormat::Minecraft, ".mca", "")                                          \
+  GROUPED(kGameWorlds, kSchematicFormat, FileFormat::Schematic, ".schem", ".schematic .litematic .nbt .mcstructure") \
+  GROUPED(kModels, kQubicleFormat, FileFormat::Qubicle, ".qb", ".qbt .qbcl .qef")                                    \
+  GROUPED(kModels, kGoxelFormat, FileFormat::Goxel, ".gox", "")                                                      \
+  GROUPED(kModels, kVoxlapFormat, FileFormat::Voxlap, ".vxl", ".kv6 .kvx")                                           \
+  GROUPED(kModels, kBinvoxFormat, FileFormat::Binvox, ".binvox", "")                                                 \
+  GROUPED(kModels, kCubeWorldFormat, FileFormat::CubeWorld, ".cub", "")                                              \
+  GROUPED(kGameWorlds, kLuantiSchematicFormat, FileFormat::LuantiSchematic, ".mts", "")                              \
+  ROW(kHeightsFormat)                                                                                                \
+  GROUPED(kVolumes, kVdbFormat, FileFormat::Vdb, ".vdb", ".nvdb")                                                    \
+  GROUPED(kVolumes, kNiftiFormat, FileFormat::Nifti, ".nii", "")                                                     \
+  GROUPED(kVolumes, kNrrdFormat, FileFormat::Nrrd, ".nrrd", ".nhdr")                                                 \
+  GROUPED(kMeshes, kGlbFormat, FileFormat::Glb, ".glb", "")                                                          \
+  GROUPED(kMeshes, kGltfFormat, FileFormat::Gltf, ".gltf", "")                                                       \
+  GROUPED(kMeshes, kPlyFormat, FileFormat::Ply, ".ply", "")                                                          \
+  GROUPED(kMeshes, kStlFormat, FileFormat::Stl, ".stl", "")                                                          \
+  GROUPED(kMeshes, kThreeMfFormat, FileFormat::ThreeMf, ".3mf", "")                                                  \
+  GROUPED(kMeshes, kOffFormat, FileFormat::Off, ".off", "")                                                          \
+  GROUPED(kMeshes, kObjFormat, FileFormat::Obj, ".obj", "")                                                          \
   GROUPED(kGameWorlds, kLuantiMapFormat, FileFormat::LuantiMap, ".sqlite", "")
 
 // Drivers of groups that are switched off are declared, but neither defined nor used.

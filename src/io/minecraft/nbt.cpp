@@ -16,11 +16,6 @@ namespace quoin::nbt {
 
 namespace {
 
-template <class T>
-T big(const std::byte* bytes) {
-  return load<T>(bytes, std::endian::big);
-}
-
 /// Returns the bytes of a number, or of an array's element; 0 for types of variable size.
 std::size_t bytes_of(Tag tag) {
   switch (tag) {
@@ -56,6 +51,7 @@ class Parser {
  public:
   Parser(std::span<const std::byte> bytes, const Limits& limits) : bytes_(bytes), limits_(limits) {
     document_.bytes_ = bytes;
+    document_.order_ = limits.order;
   }
 
   Result<Document> run() {
@@ -101,7 +97,7 @@ class Parser {
       return {};
     }
     if (!has(2)) return cut_off();
-    const std::size_t length = big<std::uint16_t>(bytes_.data() + at_);
+    const std::size_t length = load<std::uint16_t>(bytes_.data() + at_, limits_.order);
     at_ += 2;
     if (!has(length)) return cut_off();
     const auto index = add(*kind);
@@ -113,7 +109,7 @@ class Parser {
 
   Result<std::uint32_t> count() {
     if (!has(4)) return cut_off();
-    const auto count = big<std::int32_t>(bytes_.data() + at_);
+    const auto count = load<std::int32_t>(bytes_.data() + at_, limits_.order);
     if (count < 0) return fault("invalid length " + std::to_string(count), at_);
     at_ += 4;
     return static_cast<std::uint32_t>(count);
@@ -130,7 +126,7 @@ class Parser {
       done = flat(index, *elements, bytes_of(kind));
     } else if (kind == Tag::String) {
       if (!has(2)) return cut_off();
-      const std::uint32_t length = big<std::uint16_t>(bytes_.data() + at_);
+      const std::uint32_t length = load<std::uint16_t>(bytes_.data() + at_, limits_.order);
       at_ += 2;
       done = flat(index, length, 1);
     } else {
@@ -198,7 +194,7 @@ Value Document::root() const {
 std::string_view Value::name() const {
   if (document_ == nullptr || node().name == 0) return {};
   const std::byte* const text = document_->bytes_.data() + node().name;
-  return {reinterpret_cast<const char*>(text), big<std::uint16_t>(text - 2)};
+  return {reinterpret_cast<const char*>(text), load<std::uint16_t>(text - 2, document_->order_)};
 }
 
 Value Value::operator[](std::string_view name) const {
@@ -266,11 +262,11 @@ std::int64_t Value::integer(std::size_t i) const {
     case Tag::Byte:
       return static_cast<std::int8_t>(begin[i]);
     case Tag::Short:
-      return big<std::int16_t>(begin + 2 * i);
+      return load<std::int16_t>(begin + 2 * i, document_->order_);
     case Tag::Int:
-      return big<std::int32_t>(begin + 4 * i);
+      return load<std::int32_t>(begin + 4 * i, document_->order_);
     case Tag::Long:
-      return big<std::int64_t>(begin + 8 * i);
+      return load<std::int64_t>(begin + 8 * i, document_->order_);
     default:
       return 0;
   }
@@ -279,8 +275,8 @@ std::int64_t Value::integer(std::size_t i) const {
 std::optional<double> Value::number(std::size_t i) const {
   if (!is_number(element()) || i >= count()) return std::nullopt;
   const std::byte* const begin = document_->bytes_.data() + node().begin;
-  if (element() == Tag::Float) return static_cast<double>(big<float>(begin + 4 * i));
-  if (element() == Tag::Double) return big<double>(begin + 8 * i);
+  if (element() == Tag::Float) return static_cast<double>(load<float>(begin + 4 * i, document_->order_));
+  if (element() == Tag::Double) return load<double>(begin + 8 * i, document_->order_);
   return static_cast<double>(integer(i));
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -15,8 +16,8 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/result.h>
 
-// Named Binary Tag, the tree format of Minecraft (Java) saves: https://minecraft.wiki/w/NBT_format. Numbers are
-// big-endian.
+// Named Binary Tag, the tree format of Minecraft saves: https://minecraft.wiki/w/NBT_format. Numbers are big-endian in
+// the Java edition, and little-endian in files of the Bedrock edition.
 
 namespace quoin::nbt {
 
@@ -40,6 +41,7 @@ enum class Tag : std::uint8_t {
 struct Limits {
   int depth = 512;  ///< nesting of lists and compounds, the game's limit
   std::size_t nodes = std::size_t{1} << 22;
+  std::endian order = std::endian::big;
 };
 
 class Value;
@@ -69,6 +71,7 @@ class Document {
     std::uint32_t next = 0;   // node after all that is in it
   };
   std::span<const std::byte> bytes_;
+  std::endian order_ = std::endian::big;
   std::size_t size_ = 0;
   std::vector<Node> nodes_;
 };
@@ -109,7 +112,7 @@ class Value {
   [[nodiscard]] bool is_integers() const;
   /// Returns element `i` of a list of numbers of any type, or of an array.
   [[nodiscard]] std::optional<double> number(std::size_t i) const;
-  /// Returns the raw words of a long array; empty for other values.
+  /// Returns the raw words of a long array, in the byte order of the document; empty for other values.
   [[nodiscard]] std::span<const std::byte> long_bytes() const;
 
  private:

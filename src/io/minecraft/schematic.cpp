@@ -17,6 +17,7 @@
 
 #include "core/bytes/text.h"
 #include "io/byte_stream.h"
+#include "io/minecraft/bedrock_blocks.h"
 #include "io/minecraft/block_looks.h"
 #include "io/minecraft/block_types.h"
 #include "io/minecraft/nbt.h"
@@ -165,6 +166,8 @@ class SchematicReader {
   Status read_litematic(nbt::Value regions);
   Status read_litematic_region(nbt::Value from);
   Status read_structure();
+  Status read_bedrock();
+  Result<Block> bedrock_block(nbt::Value entry, std::optional<bool> is_waterlogged);
   Status put_structure(SchematicRegion& region, nbt::Value blocks);
   void take_biomes(SchematicRegion& region, nbt::Value palette, nbt::Value data, int layers);
   void take_numbered_biomes(SchematicRegion& region, nbt::Value numbers);
@@ -493,6 +496,116 @@ Status SchematicReader::read_structure() {
   return put_structure(region, root_["blocks"]);
 }
 
+/// Returns the index of water in a Bedrock palette's blocks.
+bool is_bedrock_water(nbt::Value block) {
+  const std::string_view name = block["name"].text().value_or("");
+  return name == "minecraft:water" || name == "minecraft:flowing_water";
+}
+
+// A name and states, which are bytes (switches), numbers or texts.
+Result<Block> SchematicReader::bedrock_block(nbt::Value entry, std::optional<bool> is_waterlogged) {
+  const auto name = entry["name"].text();
+  if (!name) return fault("a block without a name", entry);
+  std::vector<Property> states;
+  entry["states"].for_each([&](nbt::Value state) {
+    const auto number = state.integer();
+    states.emplace_back(state.name(), number ? std::to_string(*number) : std::string(state.text().value_or("")));
+  });
+  const BlockText block = java_block(*name, states, is_waterlogged);
+  return types_.block(block.name, block.properties);
+}
+
+/// The block indices of a Bedrock structure, ordered by x, then y, then z. A second list has the water in blocks.
+struct BedrockIndices {
+  nbt::Value blocks;
+  nbt::Value water;  ///< may be none
+  IVec3 size{0};
+  std::vector<bool> is_water;         ///< by palette index
+  std::vector<std::uint16_t> filled;  ///< by palette index: that of the block with water, or 0
+  static constexpr std::uint16_t kNone = 0xFFFF;
+
+  /// Returns the block at (x, y, z) and whether water fills its rest; kNone for no block. Errors: BadFormat.
+  [[nodiscard]] Result<std::pair<std::uint16_t, bool>> at(IVec3 voxel) const {
+    const std::size_t at =
+        (static_cast<std::size_t>(voxel.x) * static_cast<std::size_t>(size.y) + static_cast<std::size_t>(voxel.y)) *
+            static_cast<std::size_t>(size.z) +
+        static_cast<std::size_t>(voxel.z);
+    const std::int64_t block = blocks.integer(at);
+    const std::int64_t second = water ? water.integer(at) : -1;
+    const auto kinds = static_cast<std::int64_t>(is_water.size());
+    if (std::min(block, second) < -1 || std::max(block, second) >= kinds) {
+      return fault("a block index is beyond the " + std::to_string(kinds) + " blocks of the palette", blocks);
+    }
+    const bool has_water = second >= 0 && is_water[static_cast<std::size_t>(second)];
+    if (block < 0) return std::pair(has_water ? static_cast<std::uint16_t>(second) : kNone, false);
+    return std::pair(static_cast<std::uint16_t>(block), has_water && !is_water[static_cast<std::size_t>(block)]);
+  }
+};
+
+Status SchematicReader::read_bedrock() {
+  const auto size = vector_of_list(root_["size"]);
+  if (!size) return fault("the structure has no size", root_);
+  if (auto sound = check_size(*size, root_["size"]); !sound) return sound;
+  const nbt::Value structure = root_["structure"];
+  std::vector<nbt::Value> layers;
+  structure["block_indices"].for_each([&](nbt::Value layer) { layers.push_back(layer); });
+  layers.resize(2);
+  const auto is_whole = [&](nbt::Value layer) { return layer.is_integers() && layer.count() == volume_of(*size); };
+  if (!is_whole(layers[0])) {
+    return fault(
+        "the structure of " + text_of(*size) + " blocks has " + std::to_string(layers[0].count()) + " block indices",
+        structure);
+  }
+  BedrockIndices indices{layers[0], is_whole(layers[1]) ? layers[1] : nbt::Value(), *size, {}, {}};
+  const nbt::Value contents = structure["palette"]["default"];
+  std::vector<nbt::Value> entries;
+  contents["block_palette"].for_each([&](nbt::Value entry) {
+    entries.push_back(entry);
+    indices.is_water.push_back(is_bedrock_water(entry));
+  });
+  constexpr std::size_t kMaxKinds = kMaxPalette / 2;
+  if (entries.size() > kMaxKinds) return fault("the palette has more than 32,767 blocks", contents);
+  indices.filled.resize(entries.size());
+  for (int x = 0; x < size->x; ++x) {
+    for (int y = 0; y < size->y; ++y) {
+      for (int z = 0; z < size->z; ++z) {
+        const auto block = indices.at({x, y, z});
+        if (!block) return block.error();
+        if (block->second) indices.filled[block->first] = 1;
+      }
+    }
+  }
+  SchematicRegion region;
+  region.size = *size;
+  for (const bool is_waterlogged : {false, true}) {
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+      if (is_waterlogged && indices.filled[i] == 0) continue;
+      const auto block =
+          bedrock_block(entries[i], indices.filled[i] == 0 ? std::nullopt : std::optional(is_waterlogged));
+      if (!block) return block.error();
+      if (is_waterlogged) indices.filled[i] = static_cast<std::uint16_t>(region.palette.size());
+      region.palette.push_back(*block);
+    }
+  }
+  const auto air = static_cast<std::uint16_t>(region.palette.size());
+  region.palette.emplace_back();
+  contents["block_position_data"].for_each([&](nbt::Value data) {
+    if (data["block_entity_data"]) ++block_entities_;
+  });
+  entities_ += structure["entities"].count();
+  region.read_layer = [&indices, air](int y, std::span<std::uint16_t> layer) -> Status {
+    for (std::size_t i = 0; i < layer.size(); ++i) {
+      const auto width = static_cast<std::size_t>(indices.size.x);
+      const auto block = indices.at({static_cast<int>(i % width), y, static_cast<int>(i / width)});
+      if (!block) return block.error();
+      const auto [index, is_filled] = *block;
+      layer[i] = index == BedrockIndices::kNone ? air : is_filled ? indices.filled[index] : index;
+    }
+    return {};
+  };
+  return put(region);
+}
+
 void ColumnBiomes::put_into(Section& section, IVec3 corner, IVec3 size) const {
   section.biomes = tints;
   if (section.biomes.empty()) section.biomes.emplace_back();
@@ -665,6 +778,7 @@ Status SchematicReader::read_any() {
   if (const nbt::Value third = root_["Schematic"]; third["Blocks"]) return read_sponge(third);
   if (root_["BlockData"]) return read_sponge(root_);
   if (root_["Regions"].tag() == nbt::Tag::Compound) return read_litematic(root_["Regions"]);
+  if (root_["structure"]["block_indices"]) return read_bedrock();
   if (root_["size"] && (root_["palette"] || root_["palettes"])) return read_structure();
   if (root_["Blocks"].tag() == nbt::Tag::ByteArray && root_["Width"]) return read_mcedit();
   std::string keys;
@@ -715,11 +829,7 @@ bool begins_nbt(std::span<const std::byte> beginning) {
 }
 
 Result<LoadedScene> read_schematic(std::span<const std::byte> bytes, const Progress& progress) {
-  if (is_bedrock_structure(bytes)) {
-    return make_error(ErrorCode::Unsupported,
-                      "a Minecraft Bedrock structure (.mcstructure), which is not supported; load it in "
-                      "the game or a world editor and save it as a Java structure or schematic");
-  }
+  const bool is_bedrock = is_bedrock_structure(bytes);
   LargeNbt content;
   if (begins_gzip(bytes)) {
     auto large = read_large_nbt(bytes, kMaxSchematicBytes);
@@ -730,7 +840,9 @@ Result<LoadedScene> read_schematic(std::span<const std::byte> bytes, const Progr
     if (!expanded) return expanded.error();
     content.bytes = std::move(*expanded);
   }
-  const auto document = nbt::Document::parse(content.bytes, {.depth = 512, .nodes = std::size_t{1} << 24});
+  const auto document = nbt::Document::parse(
+      content.bytes,
+      {.depth = 512, .nodes = std::size_t{1} << 24, .order = is_bedrock ? std::endian::little : std::endian::big});
   if (!document) return document.error();
   return SchematicReader(document->root(), content.arrays, progress).read();
 }
@@ -740,8 +852,9 @@ Result<LoadedScene> read_schematic(std::span<const std::byte> bytes, const Progr
 namespace quoin {
 
 extern constinit const FormatDriver kSchematicFormat = {
-    .info = {FileFormat::Schematic, ".schem", "Minecraft schematic, also .schematic, .litematic and structures (.nbt)",
-             FormatCapability::Read | FormatCapability::Write, ".schematic .litematic .nbt"},
+    .info = {FileFormat::Schematic, ".schem",
+             "Minecraft schematic, also .schematic, .litematic and structures (.nbt, .mcstructure)",
+             FormatCapability::Read | FormatCapability::Write, ".schematic .litematic .nbt .mcstructure"},
     .detect = minecraft::begins_nbt,
     .read = [](const FormatInput& input) -> Result<LoadedScene> {
       return minecraft::read_schematic(input.bytes, input.progress);

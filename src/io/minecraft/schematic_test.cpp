@@ -395,16 +395,6 @@ TEST(PagedBytes, HoldsAppendedBytes) {
   EXPECT_EQ(pages.uniform(PagedBytes::kPageBytes + 6, bytes.size()), std::byte{7});
 }
 
-TEST(Schematic, NamesBedrockEdition) {
-  // Little-endian: {"format_version": 1}.
-  std::vector<std::byte> bytes = {std::byte{10}, std::byte{0}, std::byte{0}, std::byte{3}, std::byte{14}, std::byte{0}};
-  for (const char c : std::string("format_version")) bytes.push_back(static_cast<std::byte>(c));
-  for (const int b : {1, 0, 0, 0, 0}) bytes.push_back(static_cast<std::byte>(b));
-  const auto loaded = load_scene(bytes);
-  ASSERT_FALSE(loaded);
-  EXPECT_NE(loaded.error().message.find("Bedrock structure (.mcstructure)"), std::string::npos);
-}
-
 TEST(Schematic, DescribesUnknownKindInPrintableCharacters) {
   NbtWriter nbt;
   nbt.compound("").integer("a\n\x01", 1).end();
