@@ -89,6 +89,8 @@ class VulkanRenderer {
   [[nodiscard]] std::uint64_t uploaded_bytes() const;
 
   /// Renders one image, as CpuRenderer::render; `threads` compute levels of detail.
+  ///
+  /// Cost: the first image of a kind also makes its pipelines: 0.1 to 3 s, with software drivers up to a minute.
   [[nodiscard]] Result<RenderedImage> render(const Camera& camera, const RenderOptions& options = {},
                                              Threads threads = {}, const Progress& progress = {});
 
