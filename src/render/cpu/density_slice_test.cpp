@@ -7,16 +7,16 @@
 namespace quoin {
 namespace {
 
-using Pixel = std::array<int, 3>;
+using Rgb = std::array<int, 3>;
 
-Pixel pixel_at(const Image& image, int x, int y) {
+Rgb slice_pixel(const Image& image, int x, int y) {
   const std::uint8_t* at = image.rgb.data() + 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) +
                                                    static_cast<std::size_t>(x));
   return {at[0], at[1], at[2]};
 }
 
 /// Solid is red, air is blue.
-bool is_solid(const Pixel& pixel) {
+bool is_solid(const Rgb& pixel) {
   return pixel[0] > pixel[2];
 }
 
@@ -41,8 +41,8 @@ TEST(DensitySlice, ShowsBallAsDiscInEveryDirection) {
     const auto slice = draw_density_slice(scene, options);
     ASSERT_TRUE(slice) << to_string(slice.error());
     EXPECT_NEAR(slice->position, 0.0, 0.5);
-    EXPECT_TRUE(is_solid(pixel_at(slice->colour, 100, 60)));
-    EXPECT_FALSE(is_solid(pixel_at(slice->colour, 5, 60)));
+    EXPECT_TRUE(is_solid(slice_pixel(slice->colour, 100, 60)));
+    EXPECT_FALSE(is_solid(slice_pixel(slice->colour, 5, 60)));
     // 40 samples fill 96 % of 120 pixels.
     const double radius = 20.0 * 0.96 * 120 / 40.0;
     EXPECT_NEAR(static_cast<double>(slice->pixels_solid), 3.14159 * radius * radius, 0.06 * 3.14 * radius * radius);
@@ -58,11 +58,11 @@ TEST(DensitySlice, IsUprightSeenFromPositiveEnd) {
     options.axis = axis;
     const auto slice = draw_density_slice(scene, options);
     ASSERT_TRUE(slice);
-    EXPECT_FALSE(is_solid(pixel_at(slice->colour, 50, 20))) << "above the bounds";
-    EXPECT_TRUE(is_solid(pixel_at(slice->colour, 50, 50)));
+    EXPECT_FALSE(is_solid(slice_pixel(slice->colour, 50, 20))) << "above the bounds";
+    EXPECT_TRUE(is_solid(slice_pixel(slice->colour, 50, 50)));
     // The lower half is wider at its top.
-    EXPECT_TRUE(is_solid(pixel_at(slice->colour, 12, 35)));
-    EXPECT_FALSE(is_solid(pixel_at(slice->colour, 12, 68)));
+    EXPECT_TRUE(is_solid(slice_pixel(slice->colour, 12, 35)));
+    EXPECT_FALSE(is_solid(slice_pixel(slice->colour, 12, 68)));
   }
 }
 

@@ -321,7 +321,7 @@ TEST(RenderDetail, ClosenessDetectsDifferences) {
   EXPECT_LT(found.overlap, 0.999);
 }
 
-Model blobs(VoxelType* glass = nullptr) {
+Model balls(VoxelType* glass = nullptr) {
   Model model;
   std::array<VoxelType, 3> types = {add_type(model.scene, {200, 90, 60, 255}),
                                     add_type(model.scene, {60, 160, 90, 255}),
@@ -349,7 +349,7 @@ RenderOptions always_mid() {
 }
 
 TEST(RenderDetail, MidMatchesHalvedGridInFullLight) {
-  const Model model = blobs();
+  const Model model = balls();
   const Camera camera = towards({30, 25, 40}, {0, 0, 0}, 0.9);
   Scene coarse;
   for (VoxelType type = 1; type < model.scene.types.size(); ++type) {
@@ -432,7 +432,7 @@ TEST(RenderDetail, LevelsFollowFieldEdits) {
 
 TEST(RenderDetail, OpaqueMidMatchesHalvedGrid) {
   VoxelType glass = kAir;
-  Model model = blobs(&glass);
+  Model model = balls(&glass);
   Grid& voxels = model.scene.edit(model.scene.instances()[model.instance].grid).grid;
   voxels.edit(voxels.bounds(), [&](IVec3, VoxelType type) { return type == glass ? VoxelType{1} : type; });
   Scene coarse;
@@ -453,7 +453,7 @@ TEST(RenderDetail, OpaqueMidMatchesHalvedGrid) {
 }
 
 TEST(RenderDetail, NearMatchesImageWithoutDetailExactly) {
-  const Model model = blobs();
+  const Model model = balls();
   const Camera camera = towards({30, 25, 40}, {0, 0, 0}, 0.9);
   RenderOptions options = sized(64, 64);
   const RenderedImage plain = taken(model.scene, camera, options);
@@ -464,7 +464,7 @@ TEST(RenderDetail, NearMatchesImageWithoutDetailExactly) {
 }
 
 TEST(RenderDetail, GivesSameBytesForAnyThreadCount) {
-  const Model model = blobs();
+  const Model model = balls();
   const CpuRenderer renderer(model.scene);
   const Camera camera = towards({300, 250, 400}, {0, 0, 0}, 0.2);
   RenderOptions options = sized(64, 64);
@@ -533,7 +533,7 @@ std::vector<double> thresholds_of(const Model& model, const DetailPolicy& policy
 }
 
 TEST(RenderDetail, ViewsAreStableAtThresholds) {
-  const Model model = blobs();
+  const Model model = balls();
   const CpuRenderer renderer(model.scene);
   RenderOptions options = sized(64, 64);
   options.detail.colours = true;

@@ -7,6 +7,7 @@
 
 #include "core/instruction_sets_for_tests.h"
 #include "render/cpu/environment_for_tests.h"
+#include "render/cpu/glass_for_tests.h"
 #include "render/cpu/render_test_support.h"
 #include "render/light/light_model.h"
 
@@ -15,32 +16,12 @@ namespace {
 
 using namespace render_test;
 
-constexpr Rgba8 kWhite{240, 240, 240, 255};
-constexpr Rgba8 kRed{200, 30, 30, 255};
-constexpr Rgba8 kGlass{90, 170, 230, 100};
-constexpr float kAlpha = 100.0F / 255.0F;
-
-struct GlassScene {
-  Scene scene;
-  VoxelType stone = add_type(scene, kWhite);
-  VoxelType red = add_type(scene, kRed);
-  VoxelType glass = add_type(scene, kGlass, Visibility::Transparent);
-  VoxelType green = add_type(scene, {60, 220, 90, 100}, Visibility::Transparent);
-};
-
-Vec3 power(Vec3 base, float exponent) {
-  return {std::pow(base.x, exponent), std::pow(base.y, exponent), std::pow(base.z, exponent)};
-}
 // Returns the transmittance of a length of glass.
 Vec3 through(float length) {
   return power((1.0F - kAlpha) * (Vec3(1.0F) - kAlpha * (Vec3(1.0F) - linear(kGlass))), length);
 }
 Vec3 own(float length) {
   return linear(kGlass) * (1.0F - std::pow(1.0F - kAlpha, length));
-}
-
-void expect_near(Pixel a, Pixel b, int tolerance) {
-  for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(a[c], b[c], tolerance);
 }
 
 // Adds a box with faces between samples, or on them: its sides are exact.
@@ -54,12 +35,6 @@ void add_plate(DensityGrid& field, DVec3 low, DVec3 high, VoxelType type) {
     }
     return DensitySample{static_cast<float>(density), type};
   });
-}
-
-InstanceHandle place_field(Scene& scene, DensityGrid field, DVec3 position = DVec3(0.0)) {
-  SceneGrid placed;
-  placed.field = std::move(field);
-  return scene.add_instance({"", scene.add_grid(std::move(placed)), position});
 }
 
 TEST(RenderFieldGlass, SlabTintsByThicknessAndShowsOwnColour) {

@@ -28,12 +28,6 @@ RenderOptions lit_by_the_sun(int edge) {
   return options;
 }
 
-InstanceHandle place_field(Scene& scene, DensityGrid field, DVec3 position = DVec3(0.0)) {
-  SceneGrid placed;
-  placed.field = std::move(field);
-  return scene.add_instance({"", scene.add_grid(std::move(placed)), position});
-}
-
 TEST(RenderField, LightsBallByNormals) {
   Scene scene;
   const Rgba8 colour{200, 120, 60, 255};

@@ -7,6 +7,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "render/cpu/environment_for_tests.h"
+#include "render/cpu/glass_for_tests.h"
 #include "render/cpu/render_test_support.h"
 #include "render/light/glass_bodies.h"
 #include "render/light/light_model.h"
@@ -17,28 +18,9 @@ namespace {
 
 using namespace render_test;
 
-constexpr Rgba8 kWhite{240, 240, 240, 255};
-constexpr Rgba8 kGlass{90, 170, 230, 100};
-constexpr float kAlpha = 100.0F / 255.0F;
-
-struct GlassScene {
-  Scene scene;
-  VoxelType stone = add_type(scene, kWhite);
-  VoxelType glass = add_type(scene, kGlass, Visibility::Transparent);
-  VoxelType green = add_type(scene, {60, 220, 90, 100}, Visibility::Transparent);
-};
-
 // Returns the transmittance of one voxel's length of glass.
 Vec3 through_one() {
   return (1.0F - kAlpha) * (Vec3(1.0F) - kAlpha * (Vec3(1.0F) - linear(kGlass)));
-}
-
-Vec3 power(Vec3 base, float exponent) {
-  return {std::pow(base.x, exponent), std::pow(base.y, exponent), std::pow(base.z, exponent)};
-}
-
-void expect_near(Pixel a, Pixel b, int tolerance) {
-  for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(a[c], b[c], tolerance);
 }
 
 TEST(RenderGlass, PanesTintByThicknessAndShowOwnColour) {

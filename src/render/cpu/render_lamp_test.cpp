@@ -15,7 +15,7 @@ namespace {
 
 using namespace render_test;
 
-constexpr Rgba8 kWhite{255, 255, 255, 255};
+constexpr Rgba8 kBrightest{255, 255, 255, 255};
 
 RenderOptions by_night(int width, int height) {
   RenderOptions options = sized(width, height);
@@ -29,7 +29,7 @@ RenderOptions by_night(int width, int height) {
 // The y = 0 plane is the top of a white floor from -40 to 40.
 Scene floor_by_night() {
   Scene scene;
-  const VoxelType white = add_type(scene, kWhite);
+  const VoxelType white = add_type(scene, kBrightest);
   Grid grid;
   grid.fill_box({{-40, -1, -40}, {40, 0, 40}}, white);
   place(scene, std::move(grid));
@@ -108,7 +108,7 @@ TEST(RenderLamps, CastShadowsUnlessDisabled) {
 // One voxel as a lamp of six faces: its light is close to the light of the faces.
 TEST(RenderLamps, EmissiveVoxelMatchesItsFaces) {
   Scene scene = floor_by_night();
-  const VoxelType torch = add_type(scene, kWhite, Visibility::Opaque, 6.0F);
+  const VoxelType torch = add_type(scene, kBrightest, Visibility::Opaque, 6.0F);
   Grid& grid = scene.edit(scene.grids().handles()[0]).grid;
   grid.set({0, 6, 0}, torch);
   const RenderedImage image = taken(scene, from_above(0.5, 4, 0.5, 40), by_night(80, 80));
@@ -141,7 +141,7 @@ TEST(RenderLamps, EmissiveVoxelMatchesItsFaces) {
 // Analytic check of a ball of constant radiance: its light falls off with the squared distance from its centre.
 TEST(RenderLamps, EmissiveFieldMatchesItsSurface) {
   Scene scene = floor_by_night();
-  const VoxelType glow = add_type(scene, kWhite, Visibility::Opaque, 1.5F);
+  const VoxelType glow = add_type(scene, kBrightest, Visibility::Opaque, 1.5F);
   constexpr double kRadius = 4.0;
   const DVec3 middle{0.3, 12.2, -0.4};
   SceneGrid ball;
@@ -190,7 +190,7 @@ TEST(RenderLamps, FieldsAreLitAndCastShadows) {
 
 TEST(RenderLamps, ClosedLanternLightsNothing) {
   Scene scene = floor_by_night();
-  const VoxelType torch = add_type(scene, kWhite, Visibility::Opaque, 50.0F);
+  const VoxelType torch = add_type(scene, kBrightest, Visibility::Opaque, 50.0F);
   Grid& grid = scene.edit(scene.grids().handles()[0]).grid;
   grid.fill_box({{-2, 3, -2}, {3, 8, 3}}, 1);
   grid.fill_box({{-1, 4, -1}, {2, 7, 2}}, kAir);
@@ -205,7 +205,7 @@ TEST(RenderLamps, ClosedLanternLightsNothing) {
 
 TEST(RenderLamps, LightFollowsEditsAndTypes) {
   Scene scene = floor_by_night();
-  const VoxelType torch = add_type(scene, kWhite, Visibility::Opaque, 9.0F);
+  const VoxelType torch = add_type(scene, kBrightest, Visibility::Opaque, 9.0F);
   const GridHandle grid = scene.grids().handles()[0];
   CpuRenderer renderer(scene);
   const RenderOptions options = by_night(8, 8);
@@ -335,7 +335,7 @@ void expect_same(const EmissiveCells& kept, const EmissiveCells& fresh) {
 
 TEST(EmissiveCells, MatchRebuildAfterFieldEdits) {
   Scene scene;
-  const VoxelType stone = add_type(scene, kWhite);
+  const VoxelType stone = add_type(scene, kBrightest);
   const VoxelType torch = add_type(scene, {255, 120, 30, 255}, Visibility::Opaque, 3.0F);
   DensityGrid field;
   EmissiveCells kept;
@@ -360,7 +360,7 @@ TEST(EmissiveCells, MatchRebuildAfterFieldEdits) {
 // A glowing ball in a lake of the same field shines as in air; in stone it does not.
 TEST(EmissiveCells, EmissiveFieldsShineIntoSurroundingGlass) {
   Scene scene;
-  const VoxelType stone = add_type(scene, kWhite);
+  const VoxelType stone = add_type(scene, kBrightest);
   const VoxelType torch = add_type(scene, {255, 120, 30, 255}, Visibility::Opaque, 3.0F);
   const VoxelType water = add_type(scene, {60, 120, 160, 40}, Visibility::Transparent);
   const auto power_in = [&](VoxelType around) {
@@ -388,7 +388,7 @@ TEST(EmissiveCells, EmissiveFieldsShineIntoSurroundingGlass) {
 
 TEST(EmissiveCells, MatchRebuildAfterEdits) {
   Scene scene;
-  const VoxelType stone = add_type(scene, kWhite);
+  const VoxelType stone = add_type(scene, kBrightest);
   const VoxelType torch = add_type(scene, {255, 120, 30, 255}, Visibility::Opaque, 3.0F);
   const VoxelType glow = add_type(scene, {60, 220, 90, 120}, Visibility::Transparent, 2.0F);
   Grid grid;

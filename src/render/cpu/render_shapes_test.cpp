@@ -22,12 +22,6 @@ namespace {
 
 using namespace render_test;
 
-RenderOptions unlit(int width, int height) {
-  RenderOptions options = sized(width, height);
-  options.light.shading = Shading::Unlit;
-  return options;
-}
-
 // Red, green, blue and white quarters, so that each turn and mirror looks different.
 Texture quarters() {
   AlphaImage image{16, 16, {}};

@@ -21,12 +21,12 @@ using render_test::sized;
 using render_test::taken;
 using render_test::towards;
 
-constexpr Rgba8 kGrey{180, 180, 180, 255};
+constexpr Rgba8 kGround{180, 180, 180, 255};
 
 Scene floor_scene() {
   Scene scene;
   Grid grid;
-  grid.fill_box({{-20, -1, -20}, {20, 0, 20}}, add_type(scene, kGrey));
+  grid.fill_box({{-20, -1, -20}, {20, 0, 20}}, add_type(scene, kGround));
   place(scene, std::move(grid));
   return scene;
 }
@@ -44,7 +44,7 @@ TEST(RenderSky, SurfacesAndSkyFollowSunHeight) {
     const RenderOptions options = follows(sun);
     const Daylight light = daylight_of(*options.environment);
     const float diffuse = static_cast<float>(std::max(glm::normalize(sun).y, 0.0));
-    const Vec3 expected = linear(kGrey) * (0.15F * light.ambient + diffuse * light.sun);
+    const Vec3 expected = linear(kGround) * (0.15F * light.ambient + diffuse * light.sun);
     const Pixel seen = pixel_at(taken(scene, from_above(0, 5, 0, 2), options), 4, 4);
     for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(seen.at(i), encoded(expected).at(i), 1);
     const RenderedImage sky = taken(Scene{}, towards({0, 0, 0}, {0, 0, -1}), options);
@@ -59,7 +59,7 @@ TEST(RenderSky, SunBelowHorizonGivesNoLightFromBelow) {
   camera.right = {-1, 0, 0};
   RenderOptions options = follows({0.2, -1, 0});
   const RenderedImage night = taken(scene, camera, options);
-  const Vec3 ambient = 0.15F * linear(kGrey) * daylight_of(*options.environment).ambient;
+  const Vec3 ambient = 0.15F * linear(kGround) * daylight_of(*options.environment).ambient;
   EXPECT_EQ(pixel_at(night, 4, 4), encoded(ambient));
   environment_in(options).sky.model = SkyModel::Fixed;
   EXPECT_GT(pixel_at(taken(scene, camera, options), 4, 4)[0], 150) << "it does where the sky is fixed";

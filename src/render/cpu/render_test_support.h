@@ -38,6 +38,12 @@ inline InstanceHandle place(Scene& scene, Grid grid, DVec3 position = DVec3(0.0)
   return scene.add_instance({"", scene.add_grid(std::move(placed)), position});
 }
 
+inline InstanceHandle place_field(Scene& scene, DensityGrid field, DVec3 position = DVec3(0.0)) {
+  SceneGrid placed;
+  placed.field = std::move(field);
+  return scene.add_instance({"", scene.add_grid(std::move(placed)), position});
+}
+
 /// Returns an opaque texture of noise.
 inline Texture random_texture(int size, unsigned seed) {
   std::mt19937 random(seed);
@@ -88,6 +94,12 @@ inline RenderOptions sized(int width, int height) {
   options.width = width;
   options.height = height;
   options.depth = true;
+  return options;
+}
+
+inline RenderOptions unlit(int width, int height) {
+  RenderOptions options = sized(width, height);
+  options.light.shading = Shading::Unlit;
   return options;
 }
 

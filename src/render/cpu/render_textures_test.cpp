@@ -27,12 +27,6 @@ VoxelType place_box(Scene& scene, const Texture& texture, const IBox& box) {
   return type;
 }
 
-RenderOptions unlit(int width, int height) {
-  RenderOptions options = sized(width, height);
-  options.light.shading = Shading::Unlit;
-  return options;
-}
-
 // A parallel view of a face direction, `size` voxels wide and high, centred on `at`.
 Camera facing(Direction direction, DVec3 at, double size) {
   const FaceFrame& frame = frame_of(direction);
@@ -243,12 +237,6 @@ Texture plain_texture(Rgba8 colour) {
   AlphaImage image{16, 16, {}};
   for (int i = 0; i < 16 * 16; ++i) image.rgba.insert(image.rgba.end(), {colour.r, colour.g, colour.b, 255});
   return Texture::from_image("plain", image).value();
-}
-
-void place_field(Scene& scene, DensityGrid field) {
-  SceneGrid placed;
-  placed.field = std::move(field);
-  scene.add_instance({"", scene.add_grid(std::move(placed))});
 }
 
 constexpr Rgba8 kGrass{40, 200, 60, 255};
