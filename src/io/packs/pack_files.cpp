@@ -140,7 +140,7 @@ Error no_assets(const fs::path& folder) {
                     folder.string());
 }
 
-// Of the files below `assets`, or of the images of a Luanti game, mod or texture pack.
+// Returns the sums of the files below `assets`, or of the images of a Luanti game, mod or texture pack.
 Result<FileSums> sums_of_folder(const fs::path& folder) {
   FileSums sums;
   std::error_code missing;
