@@ -186,7 +186,7 @@ typedef struct quoin_shape_element {
   int32_t reserved;   /* ignored */
 } quoin_shape_element;
 
-/* A condition of a voxel's state and neighbours. Directions are those of the unturned type. */
+/* A condition of a voxel's state, neighbours and position. Directions are those of the unturned type. */
 typedef struct quoin_shape_condition {
   size_t size;
   uint32_t state_mask;  /* the bits of the state that are compared */
@@ -195,6 +195,12 @@ typedef struct quoin_shape_condition {
   uint32_t unconnected; /* sides without one */
   int32_t corner;       /* QUOIN_CORNER_... */
   int32_t reserved;     /* ignored */
+  /* A share of all voxels, selected by their positions as if at random: those whose number, which depends only on the
+   * position in the grid, is at least position_first and less than position_end after division by position_count. */
+  uint32_t position_count; /* 0: all voxels; at most 4096 */
+  uint32_t position_first;
+  uint32_t position_end;
+  uint32_t reserved_too; /* ignored */
 } quoin_shape_condition;
 
 enum { /* the corner that stairs form with their neighbours; left and right of a person who walks up */

@@ -218,6 +218,9 @@ TEST_F(CShapes, AreReadBackAndKeptInFiles) {
   conditions_[0].connected = 0b1;
   conditions_[0].unconnected = 0b10'0000;
   conditions_[1].corner = QUOIN_CORNER_INNER_RIGHT;
+  conditions_[1].position_count = 12;
+  conditions_[1].position_first = 3;
+  conditions_[1].position_end = 7;
   quoin_shapes given = list();
   given.neighbours = QUOIN_NEIGHBOURS_CONNECTED;
   given.groups = 6;

@@ -259,6 +259,12 @@ Result<ShapeCondition> condition_of(const quoin_shape_condition& given) {
                            .state = given.state,
                            .connected = DirectionSet::from_bits(static_cast<std::uint8_t>(given.connected)),
                            .unconnected = DirectionSet::from_bits(static_cast<std::uint8_t>(given.unconnected))};
+  if (given.position_count > kMaxPositionCount || given.position_first > kMaxPositionCount ||
+      given.position_end > kMaxPositionCount)
+    return make_error(ErrorCode::InvalidArgument, "a number of positions is above 4096");
+  condition.positions = {static_cast<std::uint16_t>(given.position_count),
+                         static_cast<std::uint16_t>(given.position_first),
+                         static_cast<std::uint16_t>(given.position_end)};
   if (given.corner != QUOIN_CORNER_ANY)
     condition.corner = static_cast<StairCorner>(given.corner - QUOIN_CORNER_STRAIGHT);
   return condition;
@@ -384,6 +390,9 @@ struct ListedShapes {
       each.connected = condition.connected.bits();
       each.unconnected = condition.unconnected.bits();
       if (condition.corner) each.corner = QUOIN_CORNER_STRAIGHT + static_cast<std::int32_t>(*condition.corner);
+      each.position_count = condition.positions.count;
+      each.position_first = condition.positions.first;
+      each.position_end = condition.positions.end;
       conditions.push_back(each);
     }
   }

@@ -722,7 +722,7 @@ class Shapes(unittest.TestCase):
                              collides=False)
         arm = quoin.ShapePart((quoin.Element((10, 6, 7), (16, 9, 9)),), quoin.turn_orientation(axis=1, quarter_turns=3),
                               (quoin.Condition(connected=("+Z",), unconnected=("-X", "-Z")),
-                               quoin.Condition(state_mask=0, corner="inner_right")))
+                               quoin.Condition(state_mask=0, corner="inner_right", positions=(12, 3, 7))))
         return quoin.Shapes((quoin.ShapePart((post, leaf), 29), arm), "connected", 6, False)
 
     def test_are_read_back_and_kept_in_files(self):
@@ -826,6 +826,10 @@ class Shapes(unittest.TestCase):
             (lambda: scene.set_shapes(0, box), quoin.QuoinError),
             (lambda: scene.set_shapes(2, quoin.Shapes((part((box,), 0, (quoin.Condition(corner="x"),)),))), ValueError),
             (lambda: scene.set_shapes(3, quoin.Shapes((part((box,), 0, (quoin.Condition(1),)),))), quoin.QuoinError),
+            (lambda: scene.set_shapes(3, quoin.Shapes((part((box,), 0, (quoin.Condition(positions=(0, 1, 2)),)),))),
+             ValueError),
+            (lambda: scene.set_shapes(3, quoin.Shapes((part((box,), 0, (quoin.Condition(positions=(4, 2, 2)),)),))),
+             quoin.QuoinError),
             (lambda: scene.set_orientations(3, "about_y"), quoin.QuoinError),
             (lambda: scene.set_orientations(2, "about_z"), ValueError),
             (lambda: scene.set_orientations(2, (0, 1)), TypeError),

@@ -587,6 +587,7 @@ std::size_t Grid::chunk_count() const {
 Neighbourhood Grid::neighbourhood(IVec3 chunk) const {
   Neighbourhood result;
   if (!is_loaded_around(chunk)) return result;
+  result.origin = chunk * kChunkEdge;
   for (std::size_t i = 0; i < result.chunks.size(); ++i) {
     const IVec3 offset = Neighbourhood::offset(static_cast<int>(i));
     if (has_neighbour(chunk, offset)) result.chunks[i] = find_chunk(chunk + offset);

@@ -105,7 +105,8 @@ class ShapeElement(ctypes.Structure):
 class ShapeCondition(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("state_mask", ctypes.c_uint32), ("state", ctypes.c_uint32),
                 ("connected", ctypes.c_uint32), ("unconnected", ctypes.c_uint32), ("corner", ctypes.c_int32),
-                ("reserved", ctypes.c_int32)]
+                ("reserved", ctypes.c_int32), ("position_count", ctypes.c_uint32), ("position_first", ctypes.c_uint32),
+                ("position_end", ctypes.c_uint32), ("reserved_too", ctypes.c_uint32)]
 
 
 class ShapePart(ctypes.Structure):

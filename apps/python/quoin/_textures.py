@@ -63,7 +63,7 @@ class Element(NamedTuple):
 
 
 class Condition(NamedTuple):
-    """A condition of a voxel's state and neighbours. Directions are those of the type before it is turned."""
+    """A condition of a voxel's state, neighbours and position. Directions are those of the type before it is turned."""
 
     state_mask: int = 0  #: the bits of the state that are compared
     state: int = 0  #: their values
@@ -71,6 +71,9 @@ class Condition(NamedTuple):
     unconnected: Tuple[str, ...] = ()  #: directions of sides without one
     #: of stairs: "straight", "outer_left", "outer_right", "inner_left" or "inner_right"; None: any
     corner: Optional[str] = None
+    #: a share of all voxels, selected by their positions as if at random: count, first and end. A voxel has a number
+    #: that depends only on its position; divided by count, the rest is at least first and less than end. None: all
+    positions: Optional[Tuple[int, int, int]] = None
 
 
 class ShapePart(NamedTuple):
@@ -278,8 +281,9 @@ def _element_of(one: Any, seen: Sequence[Look]) -> Element:
 
 
 def _condition_of(one: Any) -> Condition:
+    share = (one.position_count, one.position_first, one.position_end)
     return Condition(one.state_mask, one.state, _directions_of(one.connected), _directions_of(one.unconnected),
-                     _CORNERS[one.corner])
+                     _CORNERS[one.corner], share if one.position_count else None)
 
 
 class _Looks:
@@ -334,6 +338,12 @@ def _fill_condition(struct: Any, one: Any) -> None:
     struct.state = _c.whole(one.state, "state", 0, 2**32 - 1)
     struct.connected, struct.unconnected = _bits_of(one.connected), _bits_of(one.unconnected)
     struct.corner = _number_of(one.corner, _CORNERS, "corner")
+    if one.positions is None:
+        return
+    if len(one.positions) != 3 or not one.positions[0]:
+        raise ValueError("positions must be three numbers: a count from 1 to 4096, first and end")
+    struct.position_count, struct.position_first, struct.position_end = (
+        _c.whole(number, "a number of positions", 0, 4096) for number in one.positions)
 
 
 def shapes_struct(shapes: Any) -> Any:

@@ -185,6 +185,8 @@ class Chunk {
 struct Neighbourhood {
   /// Chunks at index [(dz + 1) * 9 + (dy + 1) * 3 + (dx + 1)]; the centre is 13.
   std::array<const Chunk*, 27> chunks{};
+  /// Position of the centre chunk's minimum corner in voxels of the grid. Shapes may depend on it (PositionShare).
+  IVec3 origin{0};
 
   /// Returns the offset of the chunk at an index, -1 to 1 on each axis. The inverse of `index`.
   /// Requires: 0 <= index < 27.
@@ -217,11 +219,12 @@ struct Neighbourhood {
   }
 };
 
-/// Returns the shape of the voxel at a position relative to the centre chunk, as state and neighbours select it; null
-/// if its type has no shapes. Lifetime: until the type is replaced. Requires: -63 <= local.x, local.y, local.z < 127.
+/// Returns the shape of the voxel at a position relative to the centre chunk, as state, neighbours and position in the
+/// grid select it; null if its type has no shapes. Lifetime: until the type is replaced.
+/// Requires: -63 <= local.x, local.y, local.z < 127.
 [[nodiscard]] const ShapeModel* shape_at(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 local);
 
-/// Returns a neighbourhood of a chunk without neighbours. Lifetime: same as Neighbourhood.
+/// Returns a neighbourhood of a chunk without neighbours, with the origin 0. Lifetime: same as Neighbourhood.
 [[nodiscard]] inline Neighbourhood isolated(const Chunk& chunk) {
   Neighbourhood n;
   n.chunks[13] = &chunk;

@@ -154,13 +154,38 @@ struct StateOrientations {
 /// who walks up.
 enum class StairCorner : std::uint8_t { Straight, OuterLeft, OuterRight, InnerLeft, InnerRight };
 
-/// A condition of a voxel's state and neighbours. Directions are those of the unturned type (StateOrientations).
+/// Maximum number of values that the positions of voxels can have for a type (VoxelShapes::position_count).
+inline constexpr std::uint32_t kMaxPositionCount = 4'096;
+/// Maximum number of different PositionShare values of a type.
+inline constexpr std::size_t kMaxPositionShares = 1'024;
+
+/// Returns a number below 2^31 that depends only on a voxel's position in its grid, and looks random. Games choose
+/// among the models of a block by it.
+///
+/// Source: the seed of a block's position in Minecraft (Java) and the generator of java.util.Random, a linear
+///         congruential one of 48 bits; the number is the magnitude of the lower half of its first 64-bit result.
+[[nodiscard]] std::uint32_t position_number(IVec3 voxel);
+
+/// A share of all voxels, selected by their positions as if at random: those whose position_number modulo `count` is at
+/// least `first` and less than `end`. Parts with the shares 0 to 1 and 1 to 4 of 4 are present in a quarter of all
+/// voxels, and in the others.
+struct PositionShare {
+  std::uint16_t count = 0;  ///< 0: all voxels; at most kMaxPositionCount
+  std::uint16_t first = 0;
+  std::uint16_t end = 0;
+
+  bool operator==(const PositionShare&) const = default;
+};
+
+/// A condition of a voxel's state, neighbours and position. Directions are those of the unturned type
+/// (StateOrientations).
 struct ShapeCondition {
   std::uint32_t state_mask = 0;  ///< bits of the state that are compared
   std::uint32_t state = 0;       ///< their values
   DirectionSet connected{};      ///< sides with a connection (ShapeNeighbours::Connected)
   DirectionSet unconnected{};    ///< sides without one
   std::optional<StairCorner> corner{};
+  PositionShare positions{};
 
   bool operator==(const ShapeCondition&) const = default;
 };
@@ -188,7 +213,8 @@ enum class ShapeNeighbours : std::uint8_t {
   Fluid,
 };
 
-/// The shapes of a voxel type, selected by state and neighbours. All parts whose conditions hold are present together.
+/// The shapes of a voxel type, selected by state, neighbours and position. All parts whose conditions hold are present
+/// together.
 struct ShapeRules {
   std::vector<ShapePart> parts{};
   ShapeNeighbours neighbours = ShapeNeighbours::None;
@@ -198,10 +224,11 @@ struct ShapeRules {
   bool operator==(const ShapeRules&) const = default;
 };
 
-/// A voxel's neighbours as far as they matter to its shape, in the directions of the unturned type.
+/// A voxel's neighbours and position as far as they matter to its shape, in the directions of the unturned type.
 struct ShapeSurroundings {
   DirectionSet connected{};
   StairCorner corner = StairCorner::Straight;
+  std::uint16_t position = 0;  ///< position_number of the voxel modulo VoxelShapes::position_count
   /// Heights of a fluid at the corners (x, z) = (0,0) (1,0) (1,1) (0,1), in sixteenths.
   std::array<std::uint8_t, 4> heights{14, 14, 14, 14};
 
@@ -306,8 +333,10 @@ class VoxelShapes {
   VoxelShapes(VoxelShape shape);
   /// Creates shapes from rules.
   ///
-  /// Errors: InvalidArgument if there are no or more than kMaxShapeParts parts (except for fluids), a part has no shape
-  ///         or all parts together have more than 4 * kMaxShapeElements elements.
+  /// Errors: InvalidArgument if there are no or more than kMaxShapeParts parts (except for fluids), a part has no
+  ///         shape, all parts together have more than 4 * kMaxShapeElements elements, a share of positions is empty or
+  ///         not within its count, there are more than kMaxPositionShares of them, or their counts have no common multiple
+  ///         up to kMaxPositionCount.
   [[nodiscard]] static Result<VoxelShapes> from_rules(ShapeRules rules);
 
   [[nodiscard]] bool empty() const { return content_ == nullptr; }
@@ -315,9 +344,13 @@ class VoxelShapes {
   [[nodiscard]] const ShapeRules& rules() const;
   /// Returns the bits of the state that select shapes. Requires: not empty.
   [[nodiscard]] std::uint32_t state_mask() const;
+  /// Returns the number of values that positions are reduced to: the least common multiple of PositionShare::count of
+  /// all conditions; 1 if shapes do not depend on positions. Requires: not empty.
+  [[nodiscard]] std::uint32_t position_count() const;
   /// Returns the model of a state. A voxel without any present part has an empty model. Lifetime: that of any copy of
   /// these shapes. Cost: a lookup; microseconds at the first use of a combination. Memory: kilobytes for each set of
-  /// present parts and orientation (fluids: set of heights) that was used. Requires: not empty.
+  /// present parts and orientation (fluids: set of heights) that was used. Requires: not empty;
+  /// `around.position < position_count()`.
   [[nodiscard]] const ShapeModel& model(std::uint32_t state, const AxisOrientation& orientation,
                                         const ShapeSurroundings& around) const;
 

@@ -80,7 +80,12 @@ float filled_by(const Vec3& coverage, const Vec3& hidden) {
 class ShapeCounter {
  public:
   ShapeCounter(const Grid& grid, const VoxelRegistry& types, const HalvingMasks& masks, IVec3 chunk)
-      : grid_(&grid), types_(&types), masks_(&masks), chunk_(chunk), known_types_(types.size()), kinds_(1) {}
+      : grid_(&grid), types_(&types), masks_(&masks), chunk_(chunk), known_types_(types.size()), kinds_(1) {
+    for (std::size_t type = 0; types.has_shapes() && type < types.size() && !any_by_position_; ++type) {
+      const auto number = static_cast<VoxelType>(type);
+      any_by_position_ = types.is_shaped(number) && types[number].shapes.position_count() > 1;
+    }
+  }
 
   // Requires: chunks are taken in the order of their octants. -1 <= octant <= 2.
   void take_chunk(IVec3 octant) {
@@ -119,7 +124,7 @@ class ShapeCounter {
 
   // The way to find the shape of a type's voxels.
   struct KnownType {
-    enum class Rule : std::uint8_t { Unknown, NoShape, OneShape, Fluid, ByVoxel };
+    enum class Rule : std::uint8_t { Unknown, NoShape, OneShape, Fluid, ByVoxel, ByPosition };
     Rule rule = Rule::Unknown;
     std::uint32_t kind = 0;  // OneShape: of all voxels; Fluid: of those below others
   };
@@ -184,7 +189,8 @@ class ShapeCounter {
       std::optional<std::uint32_t> kind;
       if (is_known) {
         kind = known.kind;
-      } else if (const auto around = planes.rows_around(y, z)) {
+      } else if (const auto around =
+                     known.rule == KnownType::Rule::ByPosition ? std::nullopt : planes.rows_around(y, z)) {
         if (around != known_around_) {
           kind_between_ = kind_of(planes, {0, y, z}, row[0]);
           known_around_ = around;
@@ -201,8 +207,9 @@ class ShapeCounter {
     const std::uint64_t repeated = planes.repeated(y, z);
     bool is_one = true;
     for (int x = 0; x < kChunkEdge; ++x) {
-      const bool is_repeated = (repeated >> x & 1U) != 0;
-      kinds[x] = is_repeated ? kinds[x - 1] : kind_of(planes, {x, y, z}, row[static_cast<std::size_t>(x)]);
+      const VoxelType type = row[static_cast<std::size_t>(x)];
+      const bool is_repeated = (repeated >> x & 1U) != 0 && known_type(type).rule != KnownType::Rule::ByPosition;
+      kinds[x] = is_repeated ? kinds[x - 1] : kind_of(planes, {x, y, z}, type);
       is_one &= kinds[x] == kinds[0];
       shaped |= std::uint64_t{kinds[x] != 0} << x;
     }
@@ -322,6 +329,9 @@ class ShapeCounter {
     if (shapes.rules().neighbours == ShapeNeighbours::Fluid) {
       return {KnownType::Rule::Fluid, kind_of_model(type, shapes.model(0, {}, {.heights = {16, 16, 16, 16}}))};
     }
+    // Equal neighbourhoods can have different shapes, also by the positions of neighbours.
+    const bool follows_others = shapes.rules().neighbours == ShapeNeighbours::Connected && any_by_position_;
+    if (shapes.position_count() > 1 || follows_others) return {.rule = KnownType::Rule::ByPosition};
     const bool uses_state =
         properties.state_bits != 0 && (shapes.state_mask() != 0 || !properties.orientations.empty());
     if (shapes.rules().neighbours != ShapeNeighbours::None || uses_state) return {.rule = KnownType::Rule::ByVoxel};
@@ -367,6 +377,7 @@ class ShapeCounter {
   const VoxelRegistry* types_;
   const HalvingMasks* masks_;
   IVec3 chunk_;
+  bool any_by_position_ = false;  // any type's shapes follow positions
   std::vector<KnownType> known_types_;
   std::array<KnownModel, 256> known_models_{};
   std::map<std::pair<VoxelType, const ShapeModel*>, std::uint32_t> kind_numbers_;

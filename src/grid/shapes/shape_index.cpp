@@ -25,7 +25,8 @@ const ShapeRules* rules_of(const VoxelRegistry& types, VoxelType type) {
   return types.is_shaped(type) ? &types[type].shapes.rules() : nullptr;
 }
 
-// Finds the influence of the neighbours of a voxel on its shape. `Voxels` has `get(IVec3)` and `state(IVec3)`.
+// Finds the influence of the neighbours and position of a voxel on its shape. `Voxels` has `get(IVec3)`,
+// `state(IVec3)` and `origin()`, the position of its voxel 0 in the grid.
 template <class Voxels>
 class SurroundingsFinder {
  public:
@@ -50,6 +51,9 @@ class SurroundingsFinder {
       case ShapeNeighbours::Fluid:
         around.heights = heights(voxel, type);
         break;
+    }
+    if (const std::uint32_t count = properties.shapes.position_count(); count > 1) {
+      around.position = static_cast<std::uint16_t>(position_number(voxels_.origin() + voxel) % count);
     }
     return &properties.shapes.model(state, orientation, around);
   }
@@ -162,12 +166,14 @@ struct NearVoxels {
   const Neighbourhood& chunks;
   [[nodiscard]] VoxelType get(IVec3 at) const { return chunks.get(at); }
   [[nodiscard]] std::uint32_t state(IVec3 at) const { return chunks.data(at).state; }
+  [[nodiscard]] IVec3 origin() const { return chunks.origin; }
 };
 
 struct GridVoxels {
   const Grid& grid;
   [[nodiscard]] VoxelType get(IVec3 at) const { return grid.get(at); }
   [[nodiscard]] std::uint32_t state(IVec3 at) const { return grid.data(at).state; }
+  [[nodiscard]] static IVec3 origin() { return IVec3(0); }
 };
 
 bool has_shapes(const Chunk* chunk, const VoxelRegistry& types) {

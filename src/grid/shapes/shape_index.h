@@ -45,12 +45,14 @@ class NearPlanes {
   }
   [[nodiscard]] VoxelType get(IVec3 at) const { return types_[place_of(at)]; }
   // Returns the voxels of a row whose neighbourhoods of 3^3 types and states are equal to those of the voxel before, as
-  // bits: they have the same shape. Requires: the planes z - 1 to z + 1 were read, 0 <= y, z < 64.
+  // bits: they have the same shape unless it depends on their position. Requires: the planes z - 1 to z + 1 were read,
+  // 0 <= y, z < 64.
   [[nodiscard]] std::uint64_t repeated(int y, int z) const;
   // Returns the type and state of each of the nine rows around a row, as words, if all voxels of each are equal from -1
   // to 64: the row's voxels have the same shape. Requires: as `repeated`.
   [[nodiscard]] std::optional<std::array<std::uint64_t, 9>> rows_around(int y, int z) const;
   [[nodiscard]] std::uint32_t state(IVec3 at) const { return states_.empty() ? 0 : states_[place_of(at)]; }
+  [[nodiscard]] IVec3 origin() const { return chunks_.origin; }
 
  private:
   static constexpr int kRow = kChunkEdge + 2;
@@ -166,8 +168,8 @@ class ShapesAtVoxel {
 // type has shapes.
 [[nodiscard]] bool has_glass_parts(const VoxelProperties& type);
 
-// Returns the mean colour of the drawn sides of all shapes of a type by their areas, in linear light. Cutout sides
-// count by their visible texels. Requires: the type has shapes.
+// Returns the mean colour of the drawn sides of all shapes of a type by their areas and shares of positions, in linear
+// light. Cutout sides count by their visible texels. Requires: the type has shapes.
 [[nodiscard]] Vec3 mean_of_shapes(const VoxelProperties& type);
 
 // The shaped voxels of a grid, by the voxels that they touch: a shape may reach outside its own voxel. Chunks without

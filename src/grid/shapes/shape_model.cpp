@@ -8,7 +8,9 @@
 #include <memory>
 #include <mutex>
 #include <numbers>
+#include <numeric>
 #include <optional>
+#include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -456,6 +458,31 @@ std::array<float, 2> texture_uv(const ModelFace& face, const VoxelFace& look, st
   return uv;
 }
 
+namespace {
+
+// Returns true if a share has the voxels with a reduced position.
+bool has_position(const PositionShare& share, std::uint32_t position) {
+  if (share.count == 0) return true;
+  const std::uint32_t reduced = position % share.count;
+  return reduced >= share.first && reduced < share.end;
+}
+
+}  // namespace
+
+std::uint32_t position_number(IVec3 voxel) {
+  // All steps are modulo powers of two.
+  const auto widened = [](int coordinate) { return static_cast<std::uint64_t>(std::int64_t{coordinate}); };
+  const auto x = static_cast<std::int32_t>(static_cast<std::uint32_t>(voxel.x) * 3'129'871U);
+  std::uint64_t seed = widened(x) ^ widened(voxel.z) * 116'129'781U ^ widened(voxel.y);
+  seed = seed * seed * 42'317'861U + seed * 11U;
+  seed = static_cast<std::uint64_t>(static_cast<std::int64_t>(seed) >> 16);
+  constexpr std::uint64_t kMultiplier = 0x5'DEEC'E66DU;
+  std::uint64_t generator = seed ^ kMultiplier;
+  for (int i = 0; i < 2; ++i) generator = generator * kMultiplier + 0xBU;
+  const auto lower = static_cast<std::int32_t>(static_cast<std::uint32_t>(generator >> 16));
+  return lower < 0 ? (0U - static_cast<std::uint32_t>(lower)) & 0x7FFF'FFFFU : static_cast<std::uint32_t>(lower);
+}
+
 struct VoxelShapes::Content {
   struct Key {
     std::uint32_t state = 0;  // only the bits that conditions compare
@@ -463,12 +490,13 @@ struct VoxelShapes::Content {
     std::uint8_t orientation = 0;
     std::uint8_t connected = 0;
     std::uint8_t corner = 0;
+    std::uint16_t position_class = 0;
 
     auto operator<=>(const Key&) const = default;
     [[nodiscard]] std::size_t slot() const {
       const std::uint64_t word = std::uint64_t{state} | std::uint64_t{orientation} << 32 |
                                  std::uint64_t{connected} << 40 | std::uint64_t{corner} << 48;
-      const std::uint64_t rest = std::bit_cast<std::uint32_t>(heights);
+      const std::uint64_t rest = std::bit_cast<std::uint32_t>(heights) + std::uint64_t{position_class};
       return (word * 0x9E37'79B9'7F4A'7C15U + rest * 0xC2B2'AE3D'27D4'EB4FU) >> 56;
     }
   };
@@ -484,21 +512,60 @@ struct VoxelShapes::Content {
 
   ShapeRules rules;
   std::uint32_t state_mask = 0;
+  std::uint32_t position_count = 1;
+  // By reduced position: the number of its class. All positions of a class belong to the same shares. Empty: one class.
+  std::vector<std::uint16_t> class_of_position;
+  std::vector<std::uint16_t> position_of_class;         // any of the class
   std::mutex mutex;                                     // guards `models` and `known`
   std::map<Look, ShapeModel> models;                    // entries never move
   std::map<Key, const ShapeModel*> known;               // entries never move
   std::array<std::atomic<const Entry*>, 256> recent{};  // by Key::slot
 
+  [[nodiscard]] Status add_positions();
   [[nodiscard]] std::uint64_t parts_of(const Key& key) const;
   [[nodiscard]] ShapeModel make(const Look& look, const AxisOrientation& orientation) const;
 };
 
+// Finds the classes of positions. Errors: InvalidArgument.
+Status VoxelShapes::Content::add_positions() {
+  const auto wrong = [](const std::string& reason) { return make_error(ErrorCode::InvalidArgument, reason); };
+  std::vector<PositionShare> shares;
+  for (const ShapePart& part : rules.parts) {
+    for (const ShapeCondition& condition : part.when) {
+      const PositionShare& share = condition.positions;
+      if (share == PositionShare{}) continue;
+      if (share.first >= share.end || share.end > share.count) return wrong("a share of positions is empty");
+      if (std::ranges::find(shares, share) != shares.end()) continue;
+      if (shares.size() == kMaxPositionShares) {
+        return wrong("more than " + std::to_string(kMaxPositionShares) + " shares of positions");
+      }
+      shares.push_back(share);
+      position_count = std::lcm(position_count, std::uint32_t{share.count});
+      if (position_count > kMaxPositionCount) {
+        return wrong("the shares of positions have no common count up to " + std::to_string(kMaxPositionCount));
+      }
+    }
+  }
+  if (position_count == 1) return {};
+  std::map<std::vector<bool>, std::uint16_t> classes;  // by the shares that have a position
+  for (std::uint32_t position = 0; position < position_count; ++position) {
+    std::vector<bool> in(shares.size());
+    for (std::size_t i = 0; i < shares.size(); ++i) in[i] = has_position(shares[i], position);
+    const auto [found, is_new] = classes.emplace(std::move(in), static_cast<std::uint16_t>(classes.size()));
+    if (is_new) position_of_class.push_back(static_cast<std::uint16_t>(position));
+    class_of_position.push_back(found->second);
+  }
+  return {};
+}
+
 // Returns the parts that are present.
 std::uint64_t VoxelShapes::Content::parts_of(const Key& key) const {
   const DirectionSet connected = DirectionSet::from_bits(key.connected);
+  const std::uint32_t position = position_of_class.empty() ? 0 : position_of_class[key.position_class];
   const auto holds = [&](const ShapeCondition& condition) {
     if ((key.state & condition.state_mask) != (condition.state & condition.state_mask)) return false;
     if (condition.corner && static_cast<std::uint8_t>(*condition.corner) != key.corner) return false;
+    if (!has_position(condition.positions, position)) return false;
     return (condition.connected.bits() & ~connected.bits()) == 0 &&
            (condition.unconnected.bits() & connected.bits()) == 0;
   };
@@ -556,6 +623,7 @@ Result<VoxelShapes> VoxelShapes::from_rules(ShapeRules rules) {
   if (elements > 4 * kMaxShapeElements)
     return wrong("more than " + std::to_string(4 * kMaxShapeElements) + " elements");
   content->rules = std::move(rules);
+  if (const Status added = content->add_positions(); !added) return wrong(added.error().message);
   VoxelShapes shapes;
   shapes.content_ = std::move(content);
   return shapes;
@@ -571,6 +639,11 @@ std::uint32_t VoxelShapes::state_mask() const {
   return content_->state_mask | (content_->rules.neighbours == ShapeNeighbours::Fluid ? 15U : 0U);
 }
 
+std::uint32_t VoxelShapes::position_count() const {
+  QUOIN_ASSERT(content_ != nullptr, "shapes");
+  return content_->position_count;
+}
+
 const ShapeModel& VoxelShapes::model(std::uint32_t state, const AxisOrientation& orientation,
                                      const ShapeSurroundings& around) const {
   QUOIN_ASSERT(content_ != nullptr, "shapes");
@@ -583,6 +656,8 @@ const ShapeModel& VoxelShapes::model(std::uint32_t state, const AxisOrientation&
     key.orientation = static_cast<std::uint8_t>(orientation.index());
     key.connected = around.connected.bits();
     key.corner = static_cast<std::uint8_t>(around.corner);
+    QUOIN_ASSERT(around.position < c.position_count, "around.position < position_count()");
+    if (!c.class_of_position.empty()) key.position_class = c.class_of_position[around.position];
   }
   std::atomic<const Content::Entry*>& recent = c.recent[key.slot()];
   if (const Content::Entry* entry = recent.load(std::memory_order_acquire); entry != nullptr && entry->first == key) {

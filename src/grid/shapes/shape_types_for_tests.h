@@ -2,6 +2,7 @@
 
 // Types with shapes: slab, stairs, fence, torch, flower, door, and more. For tests and benchmarks.
 
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -47,6 +48,16 @@ inline VoxelShapes fence(int rails = 1) {
   return *VoxelShapes::from_rules({.parts = std::move(parts), .neighbours = ShapeNeighbours::Connected});
 }
 
+// A low slab in a quarter of all positions, a post in half of them, else a wall that covers the side +Z.
+inline VoxelShapes rubble() {
+  const auto at = [](std::uint16_t first, std::uint16_t end) {
+    return std::vector{ShapeCondition{.positions = {4, first, end}}};
+  };
+  return *VoxelShapes::from_rules({.parts = {{.shape = VoxelShape::box({0, 0, 0}, {16, 6, 16}), .when = at(0, 1)},
+                                             {.shape = VoxelShape::box({2, 0, 2}, {10, 16, 10}), .when = at(1, 3)},
+                                             {.shape = VoxelShape::box({0, 0, 13}, {16, 16, 16}), .when = at(3, 4)}}});
+}
+
 }  // namespace quoin::shapes_for_tests
 
 namespace quoin {
@@ -63,6 +74,7 @@ struct ShapeTypes {
   VoxelType beam = kAir;    ///< reaches outside its voxel, up to a voxel away
   VoxelType water = kAir;   ///< fluid
   VoxelType pane = kAir;    ///< of glass, without textures
+  VoxelType rubble = kAir;  ///< of different shapes by position
 
   explicit ShapeTypes(VoxelRegistry& types) {
     const auto add = [&](VoxelProperties properties) {
@@ -103,6 +115,7 @@ struct ShapeTypes {
     VoxelProperties of_pane{.name = "pane", .colour = {255, 60, 60, 128}, .visibility = Visibility::Transparent};
     of_pane.shapes = VoxelShape::box({0, 0, 7}, {16, 16, 9});
     pane = add(of_pane);
+    rubble = add({.name = "rubble", .colour = {110, 120, 90}, .shapes = shapes_for_tests::rubble()});
   }
 };
 

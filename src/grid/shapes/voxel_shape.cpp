@@ -22,6 +22,17 @@ bool is_finite(const Vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+// Returns the mean share of positions of a part's conditions, 0 to 1.
+float share_of_positions(const ShapePart& part) {
+  if (part.when.empty()) return 1.0F;
+  float sum = 0.0F;
+  for (const ShapeCondition& condition : part.when) {
+    const PositionShare& share = condition.positions;
+    sum += share.count == 0 ? 1.0F : static_cast<float>(share.end - share.first) / static_cast<float>(share.count);
+  }
+  return sum / static_cast<float>(part.when.size());
+}
+
 // Returns true if all corners of an element are within the range of corners after its turn, except for rounding.
 bool stays_near(const ShapeElement& element) {
   constexpr double kRounding = 1e-3;
@@ -277,19 +288,19 @@ Vec3 mean_of_shapes(const VoxelProperties& type) {
     sum += share * colour;
     weight += share;
   };
-  const auto add_element = [&](const ShapeElement& element) {
+  const auto add_element = [&](const ShapeElement& element, float number) {
     const Vec3 size = element.max - element.min;
     for (const Direction side : kDirections) {
       const FaceFrame& frame = frame_of(side);
-      add(element.faces[static_cast<std::size_t>(side)], side, size[frame.u] * size[frame.v]);
+      add(element.faces[static_cast<std::size_t>(side)], side, number * size[frame.u] * size[frame.v]);
     }
   };
   const ShapeRules& rules = type.shapes.rules();
   if (rules.neighbours == ShapeNeighbours::Fluid) {
-    add_element({});  // fluids do not use their parts
+    add_element({}, 1.0F);  // fluids do not use their parts
   } else {
     for (const ShapePart& part : rules.parts) {
-      for (const ShapeElement& element : part.shape.elements()) add_element(element);
+      for (const ShapeElement& element : part.shape.elements()) add_element(element, share_of_positions(part));
     }
   }
   return weight > 0.0F ? sum / weight : linear_colour(type.colour);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <random>
 #include <utility>
 #include <vector>
@@ -511,7 +512,8 @@ TEST(ShapeIndex, ListsEqualThoseOfEachVoxel) {
   const VoxelType wide = *types.add(
       {.name = "wide", .shapes = *VoxelShape::from_elements({{.min = Vec3(-16, 0, -8), .max = Vec3(24, 24, 32)}})});
   const VoxelType water = add_water(types);
-  const std::array<VoxelType, 6> all = {stone, half, post, wide, water, water};
+  const VoxelType rubble = *types.add({.name = "rubble", .shapes = shapes_for_tests::rubble()});
+  const std::array<VoxelType, 7> all = {stone, half, post, wide, water, water, rubble};
   std::mt19937 random(5);
   Grid grid;
   for (int i = 0; i < 260; ++i) {
@@ -556,6 +558,118 @@ TEST(ShapeIndex, ListsEqualThoseOfEachVoxel) {
   std::size_t visited = 0;
   for (const IVec3 chunk : index.chunks()) index.for_each_in(chunk, [&](const PlacedShape&) { ++visited; });
   EXPECT_EQ(visited, shaped);
+}
+
+// java.util.Random, as its documentation states it.
+class JavaRandom {
+ public:
+  explicit JavaRandom(std::int64_t seed) : seed_((seed ^ 0x5DEECE66D) & kMask) {}
+  [[nodiscard]] std::int64_t next_long() {
+    const std::int64_t upper = std::int64_t{next()} * (std::int64_t{1} << 32);
+    return upper + next();
+  }
+
+ private:
+  static constexpr std::int64_t kMask = (std::int64_t{1} << 48) - 1;
+  std::int32_t next() {
+    seed_ = static_cast<std::int64_t>(static_cast<std::uint64_t>(seed_) * 0x5DEECE66DU + 0xBU) & kMask;
+    return static_cast<std::int32_t>(seed_ >> 16);
+  }
+  std::int64_t seed_;
+};
+
+TEST(ShapePositions, NumbersFollowThePublishedGenerator) {
+  ASSERT_EQ(JavaRandom(0).next_long(), -4962768465676381896) << "the published first number of seed 0";
+  std::mt19937 random(3);
+  for (int i = 0; i < 1'000; ++i) {
+    const auto coordinate = [&] { return static_cast<int>(random() % 60'000'000U) - 30'000'000; };
+    const IVec3 at = i == 0 ? IVec3(0) : IVec3(coordinate(), coordinate() % 320, coordinate());
+    const auto x = std::int64_t{static_cast<std::int32_t>(static_cast<std::uint32_t>(at.x) * 3'129'871U)};
+    const std::uint64_t mixed = static_cast<std::uint64_t>(x) ^
+                                static_cast<std::uint64_t>(std::int64_t{at.z} * 116'129'781) ^
+                                static_cast<std::uint64_t>(std::int64_t{at.y});
+    const std::uint64_t squared = mixed * mixed * 42'317'861U + mixed * 11U;
+    const auto number = static_cast<std::int32_t>(JavaRandom(static_cast<std::int64_t>(squared) >> 16).next_long());
+    if (number == std::numeric_limits<std::int32_t>::min()) continue;
+    EXPECT_EQ(position_number(at), static_cast<std::uint32_t>(std::abs(number))) << at.x << ' ' << at.y << ' ' << at.z;
+  }
+}
+
+TEST(ShapePositions, EachVoxelHasTheModelOfItsShare) {
+  VoxelRegistry types;
+  const VoxelType rubble = *types.add({.name = "rubble", .shapes = shapes_for_tests::rubble()});
+  EXPECT_EQ(types[rubble].shapes.position_count(), 4U);
+  EXPECT_EQ(VoxelShapes(slab()).position_count(), 1U);
+  Grid grid;
+  grid.fill_box({{-16, -16, -16}, {16, 16, 16}}, rubble);
+  std::map<int, int> count;  // by the sixteenths of the model
+  for (int i = 0; i < 32 * 32 * 32; ++i) {
+    const IVec3 at = IVec3(i & 31, i >> 5 & 31, i >> 10) - 16;
+    const ShapeModel* const model = shape_at(grid, types, at);
+    const std::uint32_t share = position_number(at) % 4;
+    const int expected = share == 0 ? 16 * 6 * 16 : share == 3 ? 16 * 16 * 3 : 8 * 16 * 8;
+    ASSERT_EQ(filled(*model), expected);
+    ++count[expected];
+    // A chunk's neighbourhood knows where it lies.
+    const IVec3 chunk = chunk_of(at);
+    EXPECT_EQ(shape_at(grid.neighbourhood(chunk), types, local_of(at)), model);
+    EXPECT_EQ(shape_at(grid.neighbourhood(chunk + IVec3(1, 0, 0)), types, at - (chunk + IVec3(1, 0, 0)) * kChunkEdge),
+              model)
+        << "seen from the next chunk";
+  }
+  ASSERT_EQ(count.size(), 3U);
+  EXPECT_NEAR(count[8 * 16 * 8], 32 * 32 * 32 / 2, 1'000);
+  EXPECT_NEAR(count[16 * 6 * 16], 32 * 32 * 32 / 4, 1'000);
+}
+
+TEST(ShapePositions, SharesOfSeveralCountsCombine) {
+  const auto part = [](int height, PositionShare share) {
+    return ShapePart{.shape = VoxelShape::box({0, 0, 0}, {16, height, 16}), .when = {{.positions = share}}};
+  };
+  const VoxelShapes shapes = *VoxelShapes::from_rules({.parts = {part(1, {3, 0, 1}), part(2, {4, 1, 3})}});
+  EXPECT_EQ(shapes.position_count(), 12U);
+  for (std::uint16_t position = 0; position < 12; ++position) {
+    const std::size_t boxes = (position % 3 == 0 ? 1U : 0U) + (position % 4 == 1 || position % 4 == 2 ? 1U : 0U);
+    EXPECT_EQ(shapes.model(0, {}, {.position = position}).boxes.size(), boxes) << position;
+  }
+  EXPECT_EQ(&shapes.model(0, {}, {.position = 4}), &shapes.model(0, {}, {.position = 8}));
+}
+
+TEST(ShapePositions, WrongSharesAreRefused) {
+  const auto error_of = [](std::vector<PositionShare> shares) {
+    ShapeRules rules;
+    for (const PositionShare& share : shares) {
+      rules.parts.push_back({.shape = slab(), .when = {{.positions = share}}});
+    }
+    const auto made = VoxelShapes::from_rules(std::move(rules));
+    return made ? "" : made.error().message;
+  };
+  EXPECT_EQ(error_of({{4, 0, 4}}), "");
+  EXPECT_EQ(error_of({{4, 2, 2}}), "cannot use the shapes of a type: a share of positions is empty");
+  EXPECT_EQ(error_of({{4, 3, 5}}), "cannot use the shapes of a type: a share of positions is empty");
+  EXPECT_EQ(error_of({{0, 0, 1}}), "cannot use the shapes of a type: a share of positions is empty");
+  EXPECT_EQ(error_of({{4'096, 0, 1}, {64, 0, 1}}), "");
+  EXPECT_EQ(error_of({{4'096, 0, 1}, {3, 0, 1}}),
+            "cannot use the shapes of a type: the shares of positions have no common count up to 4096");
+  ShapeRules rules{.parts = {{.shape = slab()}}};
+  for (std::uint16_t i = 0; i < 1'025; ++i) {
+    rules.parts[0].when.push_back({.positions = {2'048, i, static_cast<std::uint16_t>(i + 1)}});
+  }
+  EXPECT_FALSE(VoxelShapes::from_rules(std::move(rules)));
+}
+
+TEST(ShapePositions, MeansCountShares) {
+  VoxelRegistry types;
+  const auto part = [](Rgba8 colour, std::uint16_t first, std::uint16_t end) {
+    ShapeElement box;
+    for (ElementFace& face : box.faces) face.face = VoxelFace{.tint = colour};
+    return ShapePart{.shape = *VoxelShape::from_elements({box}), .when = {{.positions = {4, first, end}}}};
+  };
+  const VoxelType type = *types.add(
+      {.name = "t", .shapes = *VoxelShapes::from_rules({.parts = {part({255, 0, 0}, 0, 1), part({0, 255, 0}, 1, 4)}})});
+  const Vec3 mean = mean_of_shapes(types[type]);
+  EXPECT_NEAR(mean.x, 0.25F, 1e-6F);
+  EXPECT_NEAR(mean.y, 0.75F, 1e-6F);
 }
 
 // Blocks of equal voxels share their list.

@@ -492,7 +492,7 @@ VoxelProperties shaped_type() {
   tilted.faces[4].face = VoxelFace{.tint = {1, 2, 3, 255}, .alpha = FaceAlpha::Translucent};
   ShapePart bar{.shape = *VoxelShape::from_elements({ShapeElement{}, tilted}), .orientation = AxisOrientation::at(29)};
   bar.when = {{.state_mask = 3, .state = 2, .connected = {Direction::NegX, Direction::PosZ}},
-              {.unconnected = {Direction::PosY}, .corner = StairCorner::InnerLeft}};
+              {.unconnected = {Direction::PosY}, .corner = StairCorner::InnerLeft, .positions = {12, 3, 7}}};
   type.shapes = *VoxelShapes::from_rules({.parts = {{.shape = VoxelShape::box({1, 2, 3}, {4, 5, 6})}, bar},
                                           .neighbours = ShapeNeighbours::Connected,
                                           .groups = 0xF000'0001U,
@@ -565,6 +565,14 @@ TEST(SceneData, RefusesInvalidShapesWithTheirPosition) {
   EXPECT_EQ(
       error_with("\"inner_left\"", "\"left\""),
       shapes + ".parts[1].when[1].corner: must be one of straight, outer_left, outer_right, inner_left, inner_right");
+  const std::string condition = shapes + ".parts[1].when[1]";
+  EXPECT_EQ(error_with("[12,3,7]", "[12,3,7]"), "");
+  EXPECT_EQ(error_with("[12,3,7]", "[0,3,7]"), condition + ".positions: the count must be at least 1");
+  EXPECT_EQ(error_with("[12,3,7]", "[12,7,7]"),
+            shapes + ": cannot use the shapes of a type: a share of positions is empty");
+  for (const char* const wrong : {"[12,3]", "[12,3,-7]", "[4097,3,7]", "[12,3,7.5]", "7"}) {
+    EXPECT_TRUE(error_with("[12,3,7]", wrong).starts_with(condition + ".positions")) << wrong;
+  }
   EXPECT_EQ(error_with("\"degrees\":22.5", "\"degrees\":1e300"), element + ".turn.degrees: is too large");
   EXPECT_EQ(error_with("\"axis\":2", "\"axis\":3"), element + ".turn.axis: must be a whole number from 0 to 2");
   EXPECT_EQ(error_with("[-15.5,", "[-17,"), shapes +

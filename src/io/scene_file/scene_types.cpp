@@ -113,6 +113,8 @@ OrderedJson json_of(const ShapeCondition& condition) {
   if (!condition.connected.empty()) json["connected"] = names_of(condition.connected);
   if (!condition.unconnected.empty()) json["unconnected"] = names_of(condition.unconnected);
   if (condition.corner) json["corner"] = name_of(kStairCorners, *condition.corner);
+  const PositionShare& positions = condition.positions;
+  if (!(positions == PositionShare{})) json["positions"] = {positions.count, positions.first, positions.end};
   return json;
 }
 
@@ -340,7 +342,7 @@ DirectionSet directions_of(const Object& object, std::string_view key) {
 }
 
 ShapeCondition condition_of(const Json& json, const Place& place, Faults& faults) {
-  const Object object(json, place, {"state_mask", "state", "connected", "unconnected", "corner"}, faults);
+  const Object object(json, place, {"state_mask", "state", "connected", "unconnected", "corner", "positions"}, faults);
   ShapeCondition condition;
   condition.state_mask = bits_in(object, "state_mask").value_or(0);
   condition.state = bits_in(object, "state").value_or(0);
@@ -348,6 +350,13 @@ ShapeCondition condition_of(const Json& json, const Place& place, Faults& faults
   condition.unconnected = directions_of(object, "unconnected");
   if (object.find("corner") != nullptr) {
     read_name(object, "corner", kStairCorners, condition.corner.emplace(StairCorner::Straight));
+  }
+  if (const Json* positions = object.find("positions")) {
+    constexpr int kMost = static_cast<int>(kMaxPositionCount);
+    const std::vector<int> share = object.whole_numbers(*positions, object.place_of("positions"), 3, 0, kMost);
+    const auto number = [&](std::size_t i) { return static_cast<std::uint16_t>(share[i]); };
+    condition.positions = {number(0), number(1), number(2)};
+    if (condition.positions.count == 0) faults.add(object.place_of("positions"), "the count must be at least 1");
   }
   return condition;
 }

@@ -146,8 +146,9 @@ struct ShapedVoxels {
     bool is_opaque = false;
     bool has_state = false;
     bool is_turned = false;
+    bool uses_position = false;
     const ShapeRules* rules = nullptr;
-    const ShapeModel* only_model = nullptr;  // if neither state nor neighbours matter
+    const ShapeModel* only_model = nullptr;  // if neither state, neighbours nor position matter
   };
   std::array<KnownModel, 256> known_models{};
   std::array<KnownType, 64> known_types{};

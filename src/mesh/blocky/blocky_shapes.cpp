@@ -82,7 +82,7 @@ class ModelFinder {
     if (known.only_model != nullptr) {
       voxel.model = known.only_model;
     } else if (known.rules->neighbours == ShapeNeighbours::None) {
-      voxel.model = model(type, state, {});
+      voxel.model = known.uses_position ? &model_by_position(local, type, state) : model(type, state, {});
     } else {
       shapes_.pending.push_back({static_cast<std::uint32_t>(shapes_.voxels.size()), state});
     }
@@ -95,7 +95,8 @@ class ModelFinder {
       ShapedVoxel& voxel = shapes_.voxels[number];
       const ShapedVoxels::KnownType& known = known_type(voxel.type);
       const bool is_connected = known.rules->neighbours == ShapeNeighbours::Connected;
-      if (!job_.region.contains(voxel.local)) {  // the layers do not have all neighbours
+      // The layers do not have all neighbours, and the list of known models is one for all positions.
+      if (!job_.region.contains(voxel.local) || known.uses_position) {
         voxel.model = shape_at(*job_.chunks, *job_.types, voxel.local);
       } else if (is_connected) {
         voxel.model = model(voxel.type, state, {.connected = connections(voxel.local, state, known)});
@@ -117,9 +118,20 @@ class ModelFinder {
              .is_opaque = properties.visibility == Visibility::Opaque,
              .has_state = properties.state_bits != 0,
              .is_turned = !properties.orientations.empty(),
+             .uses_position = properties.shapes.position_count() > 1,
              .rules = &properties.shapes.rules()};
-    if (!known.has_state && known.rules->neighbours == ShapeNeighbours::None) known.only_model = model(type, 0, {});
+    if (!known.has_state && !known.uses_position && known.rules->neighbours == ShapeNeighbours::None) {
+      known.only_model = model(type, 0, {});
+    }
     return known;
+  }
+
+  // Requires: the type's shapes follow positions, but no neighbours.
+  [[nodiscard]] const ShapeModel& model_by_position(const IVec3& local, VoxelType type, std::uint32_t state) const {
+    const VoxelProperties& properties = (*job_.types)[type];
+    const std::uint32_t position = position_number(job_.chunks->origin + local) % properties.shapes.position_count();
+    return properties.shapes.model(state, properties.orientations.of(state),
+                                   {.position = static_cast<std::uint16_t>(position)});
   }
 
   // Requires: the type's shapes are no fluids.

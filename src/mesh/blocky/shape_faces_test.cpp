@@ -49,6 +49,7 @@ VoxelRegistry shaped_types() {
        .orientations = StateOrientations::to_directions(),
        .shapes = *VoxelShape::from_elements({{.min = Vec3(2, -8, 2), .max = Vec3(14, 24, 14)}})});
   add({.name = "block", .shapes = VoxelShape::box(IVec3(0), IVec3(16))});
+  add({.name = "rubble", .state_bits = 3, .orientations = turns, .shapes = shapes_for_tests::rubble()});
   add({.name = "turned fence", .state_bits = 3, .orientations = turns, .shapes = shapes_for_tests::fence()});
   return types;
 }

@@ -123,8 +123,8 @@ PlainHit nearest_of(const std::vector<PlainSolid>& solids, const Ray& ray, bool 
 Scene random_shapes(Random& random) {
   Scene scene;
   const ShapeTypes types(scene.types);
-  const std::vector<VoxelType> all = {types.stone,  types.slab, types.stairs, types.fence, types.torch,
-                                      types.flower, types.door, types.beam,   types.water, types.pane};
+  const std::vector<VoxelType> all = {types.stone, types.slab, types.stairs, types.fence, types.torch, types.flower,
+                                      types.door,  types.beam, types.water,  types.pane,  types.rubble};
   std::vector<GridHandle> grids;
   for (int i = 0; i < 3; ++i) {
     SceneGrid grid;
@@ -256,8 +256,8 @@ TEST(ShapeQuery, TurnedElementsGiveTheirNormal) {
 Scene shapes_and_cubes(Random& random) {
   Scene scene;
   const ShapeTypes types(scene.types);
-  const std::vector<VoxelType> all = {types.stone,  types.slab, types.stairs, types.fence, types.torch,
-                                      types.flower, types.door, types.beam,   types.water, types.pane};
+  const std::vector<VoxelType> all = {types.stone, types.slab, types.stairs, types.fence, types.torch, types.flower,
+                                      types.door,  types.beam, types.water,  types.pane,  types.rubble};
   SceneGrid grid;
   const auto put = [&](IVec3 at) {
     grid.grid.set(at, all[random.engine() % all.size()], {static_cast<std::uint32_t>(random.engine() % 6), {}});

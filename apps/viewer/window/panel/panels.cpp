@@ -419,7 +419,9 @@ const ShapeModel* outlined_shape(const ViewState& state, const Instance& instanc
   const Ray ray = ray_through(state.camera.camera(), {state.mouse.x, state.mouse.y, place.w, place.h});
   const std::uint32_t voxel_state = state_of(brush, hit, ray.direction, instance, grid, types);
   const VoxelProperties& type = types[brush.type];
-  return &type.shapes.model(voxel_state, type.orientations.of(voxel_state), {});
+  const std::uint32_t position = position_number(hit.voxel + normal_of(hit.face)) % type.shapes.position_count();
+  return &type.shapes.model(voxel_state, type.orientations.of(voxel_state),
+                            {.position = static_cast<std::uint16_t>(position)});
 }
 
 void draw_shape(const WorldLines& lines, const Instance& instance, const SceneGrid& grid, IVec3 voxel,

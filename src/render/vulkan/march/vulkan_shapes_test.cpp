@@ -69,6 +69,8 @@ struct Garden {
     for (int y = 0; y < 2; ++y) g.set({2, y, -2}, types.door, {.state = 1});
     g.set({3, 3, 3}, types.beam);
     g.set({-6, 0, 5}, types.beam);
+    g.fill_box({{-8, 0, -8}, {9, 1, -7}}, types.rubble);
+    g.fill_box({{7, 0, -6}, {9, 2, 8}}, types.rubble);
     if (!has_glass) return g;
     for (std::uint32_t i = 0; i < 5; ++i) g.set({static_cast<int>(i) - 3, 0, 4}, types.water, {.state = i});
     g.fill_box({{-4, -2, 5}, {0, 0, 7}}, types.water);

@@ -86,8 +86,8 @@ struct Yard {
     SceneGrid yard;
     yard.pivot = {0.5, 0.25, -0.5};
     yard.grid.fill_box({{-8, -2, -8}, {9, 0, 9}}, types.stone);
-    const std::array kinds = {types.slab, types.stairs, types.fence,     types.torch,    types.flower,
-                              types.door, types.beam,   textured_stairs, textured_fence, textured_stairs};
+    const std::array kinds = {types.slab, types.stairs,    types.fence,    types.torch,     types.flower, types.door,
+                              types.beam, textured_stairs, textured_fence, textured_stairs, types.rubble};
     std::uint32_t state = 0;
     for (int z = -7; z < 8; z += 3) {
       for (int x = -7; x < 8; x += 2, ++state) {
