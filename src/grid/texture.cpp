@@ -1,9 +1,12 @@
 #include <quoin/grid/texture.h>
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <functional>
+#include <mutex>
 #include <utility>
 
 #include <quoin/core/assert.h>
@@ -34,8 +37,15 @@ struct Texture::Content {
   float mean_alpha = 1.0F;
   float coverage = 1.0F;
   std::uint64_t hash = 0;
-  BlockVector<Rgba8> texels;                  // of all levels, level 0 first
   std::array<std::size_t, 12> level_begin{};  // [level], and the end
+  bool is_measured = false;                   // the members above are set
+  BlockVector<Rgba8> texels;                  // of all levels, level 0 first
+  std::atomic<const Rgba8*> ready = nullptr;  // `texels`, once they are complete
+  std::mutex mutex;                           // guards `decode` and its result
+  std::function<AlphaImage()> decode;         // of a deferred texture without texels
+
+  void fill(const AlphaImage& image, bool keeps_texels);
+  [[nodiscard]] const Rgba8* all_texels() const;
 };
 
 namespace {
@@ -69,16 +79,22 @@ void halve(BlockVector<Light>& texels, std::size_t size) {
   texels.resize(half * half);
 }
 
+// Returns the number of texels of all levels: side^2 * (1 + 1/4 + 1/16 + ...).
+std::size_t texel_count(std::size_t side) {
+  return (4 * side * side - 1) / 3;
+}
+
 std::uint8_t byte_of(float unit) {
   return static_cast<std::uint8_t>(std::lround(unit * 255.0F));
 }
 
-std::uint64_t hash_of(const std::string& name, const BlockVector<Rgba8>& texels) {
-  std::uint64_t hash = texels.size();
+// Returns a hash of the name and level 0. The other levels follow from it.
+std::uint64_t hash_of(const std::string& name, const std::vector<std::uint8_t>& rgba) {
+  std::uint64_t hash = rgba.size();
   for (const char c : name) hash = mixed_with(hash, static_cast<unsigned char>(c));
-  for (std::size_t i = 0; i + 1 < texels.size(); i += 2) {
+  for (std::size_t i = 0; i + 8 <= rgba.size(); i += 8) {
     std::uint64_t word = 0;
-    std::memcpy(&word, &texels[i], sizeof(word));
+    std::memcpy(&word, &rgba[i], sizeof(word));
     hash = mixed_with(hash, word);
   }
   return hash;
@@ -96,41 +112,80 @@ std::string fault_of(const AlphaImage& image) {
 
 }  // namespace
 
+void Texture::Content::fill(const AlphaImage& image, bool keeps_texels) {
+  const auto side = static_cast<std::size_t>(image.width);
+  if (keeps_texels) {
+    texels.resize(texel_count(side));
+    std::memcpy(texels.data(), image.rgba.data(), image.rgba.size());
+  }
+  BlockVector<Light> level(side * side);
+  std::size_t visible = 0;
+  bool all_opaque = true;
+  const std::array<float, 256>& linear = linear_bytes();
+  for (std::size_t i = 0; i < level.size(); ++i) {
+    const std::uint8_t* const texel = &image.rgba[4 * i];
+    level[i] = {{linear[texel[0]], linear[texel[1]], linear[texel[2]]}, static_cast<float>(texel[3]) / 255.0F};
+    all_opaque &= texel[3] == 255;
+    visible += texel[3] >= kCutoutAlpha ? 1 : 0;
+  }
+  std::size_t end = level.size();
+  std::size_t number = 1;
+  std::array<std::size_t, 12> begins{};
+  begins[number] = end;
+  for (std::size_t edge = side; edge > 1; edge /= 2) {
+    halve(level, edge);
+    for (std::size_t i = 0; keeps_texels && i < level.size(); ++i) {
+      Rgba8& out = texels[end + i];
+      out = srgb_colour(level[i].colour);
+      out.a = byte_of(level[i].alpha);
+    }
+    end += level.size();
+    begins[++number] = end;
+  }
+  QUOIN_ASSERT(end == texel_count(side) && level.size() == 1, "all levels are full");
+  if (is_measured) return;  // other threads may read the rest
+  is_measured = true;
+  level_begin = begins;
+  is_opaque = all_opaque;
+  coverage = static_cast<float>(visible) / static_cast<float>(side * side);
+  mean = level.front().colour;
+  mean_alpha = level.front().alpha;
+  hash = hash_of(name, image.rgba);
+}
+
+const Rgba8* Texture::Content::all_texels() const {
+  if (const Rgba8* const made = ready.load(std::memory_order_acquire)) [[likely]]
+    return made;
+  auto& self = const_cast<Content&>(*this);  // NOLINT: texels are a cache
+  const std::scoped_lock lock(self.mutex);
+  if (const Rgba8* const made = ready.load(std::memory_order_acquire)) return made;
+  const AlphaImage image = self.decode();
+  QUOIN_ASSERT(image.width == size && fault_of(image).empty(), "the image that was decoded before");
+  self.fill(image, true);
+  self.decode = nullptr;
+  self.ready.store(texels.data(), std::memory_order_release);
+  return texels.data();
+}
+
 Result<Texture> Texture::from_image(std::string name, const AlphaImage& image) {
+  return made(std::move(name), image, nullptr);
+}
+
+Result<Texture> Texture::deferred(std::string name, const AlphaImage& image, std::function<AlphaImage()> decode) {
+  QUOIN_ASSERT(decode != nullptr, "a function that returns the image");
+  return made(std::move(name), image, std::move(decode));
+}
+
+Result<Texture> Texture::made(std::string name, const AlphaImage& image, std::function<AlphaImage()> decode) {
   if (const std::string fault = fault_of(image); !fault.empty()) {
     return make_error(ErrorCode::InvalidArgument, "cannot use texture \"" + name + "\": " + fault);
   }
   const auto content = std::make_shared<Content>();
   content->name = std::move(name);
   content->size = image.width;
-  const auto side = static_cast<std::size_t>(image.width);
-  content->texels.resize((4 * side * side - 1) / 3);  // side^2 * (1 + 1/4 + 1/16 + ...)
-  std::memcpy(content->texels.data(), image.rgba.data(), image.rgba.size());
-  BlockVector<Light> level(side * side);
-  std::size_t visible = 0;
-  for (std::size_t i = 0; i < level.size(); ++i) {
-    const Rgba8 texel = content->texels[i];
-    level[i] = {linear_colour(texel), static_cast<float>(texel.a) / 255.0F};
-    content->is_opaque &= texel.a == 255;
-    visible += texel.a >= kCutoutAlpha ? 1 : 0;
-  }
-  content->coverage = static_cast<float>(visible) / static_cast<float>(level.size());
-  std::size_t end = level.size();
-  std::size_t number = 1;
-  content->level_begin[number] = end;
-  for (std::size_t size = side; size > 1; size /= 2) {
-    halve(level, size);
-    for (const Light& texel : level) {
-      Rgba8& out = content->texels[end++];
-      out = srgb_colour(texel.colour);
-      out.a = byte_of(texel.alpha);
-    }
-    content->level_begin[++number] = end;
-  }
-  QUOIN_ASSERT(end == content->texels.size() && level.size() == 1, "all levels are full");
-  content->mean = level.front().colour;
-  content->mean_alpha = level.front().alpha;
-  content->hash = hash_of(content->name, content->texels);
+  content->fill(image, decode == nullptr);
+  if (decode == nullptr) content->ready.store(content->texels.data(), std::memory_order_release);
+  content->decode = std::move(decode);
   return Texture(content);
 }
 
@@ -151,7 +206,7 @@ int Texture::level_count() const {
 std::span<const Rgba8> Texture::level(int level) const {
   QUOIN_ASSERT(level >= 0 && level < level_count(), "a level of the texture");
   const std::size_t* const begin = content_->level_begin.data() + level;
-  return std::span<const Rgba8>(content_->texels).subspan(begin[0], begin[1] - begin[0]);
+  return {content_->all_texels() + begin[0], begin[1] - begin[0]};
 }
 
 bool Texture::is_opaque() const {
@@ -181,13 +236,20 @@ std::uint64_t Texture::hash() const {
 
 std::size_t Texture::bytes() const {
   QUOIN_ASSERT(content_ != nullptr, "a texture that is not null");
-  return content_->texels.size() * sizeof(Rgba8);
+  return texel_count(static_cast<std::size_t>(content_->size)) * sizeof(Rgba8);
+}
+
+bool Texture::has_texels() const {
+  QUOIN_ASSERT(content_ != nullptr, "a texture that is not null");
+  return content_->ready.load(std::memory_order_acquire) != nullptr;
 }
 
 bool Texture::operator==(const Texture& other) const {
   if (content_ == other.content_) return true;
   if (content_ == nullptr || other.content_ == nullptr || content_->hash != other.content_->hash) return false;
-  return content_->name == other.content_->name && content_->texels == other.content_->texels;
+  return content_->name == other.content_->name && content_->size == other.content_->size &&
+         std::equal(content_->all_texels(), content_->all_texels() + texel_count(static_cast<std::size_t>(size())),
+                    other.content_->all_texels());
 }
 
 VoxelFaces::VoxelFaces(const VoxelFace& all) : VoxelFaces(std::array{all, all, all, all, all, all}) {}

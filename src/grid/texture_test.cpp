@@ -1,13 +1,16 @@
 #include <quoin/grid/texture.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <new>
 #include <random>
 #include <string>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
+#include <quoin/core/parallel.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/quad.h>
 
@@ -41,6 +44,81 @@ Texture texture_of(const AlphaImage& image, const char* name = "t") {
 std::string error_of_image(const AlphaImage& image) {
   const auto made = Texture::from_image("wall", image);
   return made ? "" : made.error().message;
+}
+
+TEST(DeferredTexture, MakesTexelsWhenTheyAreFirstRead) {
+  const AlphaImage image = noise(64, 5, true);
+  const Texture eager = texture_of(image);
+  std::atomic<int> decoded = 0;
+  const Texture texture = Texture::deferred("t", image, [&] {
+                            ++decoded;
+                            return image;
+                          }).value();
+  EXPECT_EQ(texture.mean(), eager.mean());
+  EXPECT_EQ(texture.mean_alpha(), eager.mean_alpha());
+  EXPECT_EQ(texture.coverage(), eager.coverage());
+  EXPECT_EQ(texture.is_opaque(), eager.is_opaque());
+  EXPECT_EQ(texture.hash(), eager.hash());
+  EXPECT_EQ(texture.size(), 64);
+  EXPECT_EQ(texture.level_count(), 7);
+  EXPECT_EQ(texture.bytes(), eager.bytes());
+  // A registry needs no texels.
+  VoxelRegistry types;
+  const VoxelProperties type{.name = "t",
+                             .visibility = Visibility::Transparent,
+                             .faces = VoxelFaces(VoxelFace{.texture = texture, .alpha = FaceAlpha::Cutout})};
+  ASSERT_TRUE(types.add(type));
+  EXPECT_EQ(types.find_or_add(type), VoxelType{1});
+  EXPECT_EQ(types[1].colour, type.faces.mean_colour());
+  EXPECT_FALSE(texture.has_texels());
+  EXPECT_TRUE(eager.has_texels());
+  EXPECT_EQ(decoded, 0);
+  parallel_for(64, {8}, [&](std::size_t i) {
+    const int level = static_cast<int>(i) % 7;
+    EXPECT_TRUE(std::ranges::equal(texture.level(level), eager.level(level)));
+  });
+  EXPECT_EQ(decoded, 1) << "by one of the threads";
+  EXPECT_TRUE(texture.has_texels());
+  EXPECT_EQ(texture, eager);
+}
+
+TEST(DeferredTexture, AreDecodedForAllTypesAtOnce) {
+  VoxelRegistry types;
+  std::atomic<int> decoded = 0;
+  const auto deferred = [&](unsigned seed) {
+    const AlphaImage image = noise(16, seed, false);
+    return Texture::deferred("t" + std::to_string(seed), image,
+                             [&decoded, image] {
+                               ++decoded;
+                               return image;
+                             })
+        .value();
+  };
+  const Texture face = deferred(1);
+  ASSERT_TRUE(types.add({.name = "cube", .faces = VoxelFaces(face)}));
+  ShapeElement box{.max = Vec3(16, 8, 16)};
+  const Texture top = deferred(2);
+  box.faces[2].face = VoxelFace{top};
+  ASSERT_TRUE(types.add({.name = "slab", .shapes = *VoxelShape::from_elements({box})}));
+  EXPECT_EQ(&decode_textures(types, {2}), &types);
+  EXPECT_TRUE(face.has_texels() && top.has_texels());
+  EXPECT_EQ(decoded, 2);
+  decode_textures(types, {2});
+  EXPECT_EQ(decoded, 2);
+}
+
+TEST(DeferredTexture, RefusesWrongSizesAndTriesAgainWithoutMemory) {
+  EXPECT_FALSE(Texture::deferred("t", plain(8, {}), [] { return plain(8, {}); }));
+  const AlphaImage image = noise(16, 1, false);
+  bool has_memory = false;
+  const Texture texture = Texture::deferred("t", image, [&] {
+                            if (!has_memory) throw std::bad_alloc();
+                            return image;
+                          }).value();
+  EXPECT_THROW(static_cast<void>(texture.level(0)), std::bad_alloc);
+  EXPECT_FALSE(texture.has_texels());
+  has_memory = true;
+  EXPECT_TRUE(std::ranges::equal(texture.level(0), texture_of(image).level(0)));
 }
 
 TEST(Texture, RefusesWrongSizesByName) {

@@ -179,7 +179,7 @@ void VoxelRegistry::Content::share_textures(VoxelFaces& faces) {
     auto known = std::find_if(first, last, [&](const auto& each) { return each.second.texture == face.texture; });
     if (known == last) known = textures.emplace(face.texture.hash(), SharedTexture{face.texture});
     ++known->second.faces;
-    is_shared = is_shared && known->second.texture.level(0).data() == face.texture.level(0).data();
+    is_shared = is_shared && known->second.texture.shares_texels_with(face.texture);
     face.texture = known->second.texture;
   }
   if (!is_shared) faces = VoxelFaces(shared);
@@ -210,6 +210,20 @@ void for_each_look(const VoxelProperties& type, FunctionRef<void(const VoxelFace
       }
     }
   }
+}
+
+const VoxelRegistry& decode_textures(const VoxelRegistry& types, Threads threads) {
+  if (!types.has_textures() && !types.has_shapes()) return types;
+  std::vector<Texture> deferred;
+  for (std::size_t type = 1; type < types.size(); ++type) {
+    for_each_look(types[static_cast<VoxelType>(type)], [&](const VoxelFace& look) {
+      const Texture& texture = look.texture;
+      if (texture.is_null() || texture.has_texels()) return;
+      if (deferred.empty() || !deferred.back().shares_texels_with(texture)) deferred.push_back(texture);
+    });
+  }
+  parallel_for(deferred.size(), threads, [&](std::size_t i) { static_cast<void>(deferred[i].level(0)); });
+  return types;
 }
 
 Status validate_type(const VoxelProperties& properties) {

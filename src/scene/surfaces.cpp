@@ -133,7 +133,7 @@ class MaterialShares {
 Vec3 mean_colour(const VoxelFace& face) {
   const Vec3 tint = linear_colour(face.tint);
   if (face.texture.is_null()) return tint;
-  return linear_colour(face.texture.level(face.texture.level_count() - 1)[0]) * tint;
+  return linear_colour(srgb_colour(face.texture.mean())) * tint;  // as the last level
 }
 
 FaceTexels face_texels(const VoxelFace& face, Direction direction, float emission) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -53,7 +54,7 @@ inline constexpr std::uint8_t kCutoutAlpha = 128;
 ///           it: the colour in linear light and weighted by alpha, so that colours of invisible texels do not show, and
 ///           the alpha unweighted.
 /// Equality: same name and same texels. Cost: one comparison for handles to the same texels, or of different content.
-/// Memory:   4/3 * 4 * size^2 bytes, shared by all copies.
+/// Memory:   4/3 * 4 * size^2 bytes, shared by all copies; see `deferred`.
 /// Threads:  different copies may be used on several threads at once.
 class Texture {
  public:
@@ -67,6 +68,11 @@ class Texture {
   ///         kMinTextureSize to kMaxTextureSize, or it has another number of bytes than its sizes require.
   /// Cost:   O(texels), about 50 ns each.
   [[nodiscard]] static Result<Texture> from_image(std::string name, const AlphaImage& image);
+  /// Makes a texture that keeps no texels until they are first read, for worlds with more textures than an image shows.
+  /// `decode` must return the same image again. Any thread calls it once, at the first call of `level`, and then
+  /// releases it. Errors and cost: as from_image, at both times.
+  [[nodiscard]] static Result<Texture> deferred(std::string name, const AlphaImage& image,
+                                                std::function<AlphaImage()> decode);
 
   [[nodiscard]] bool is_null() const { return content_ == nullptr; }
 
@@ -77,7 +83,8 @@ class Texture {
   [[nodiscard]] int size() const;
   /// Returns the number of mipmap levels: log2(size) + 1.
   [[nodiscard]] int level_count() const;
-  /// Returns the texels of a level, which has size >> level texels per side. Requires: 0 <= level < level_count().
+  /// Returns the texels of a level, which has size >> level texels per side. The first call for a deferred texture
+  /// makes the texels of all levels; errors: bad_alloc. Requires: 0 <= level < level_count().
   [[nodiscard]] std::span<const Rgba8> level(int level) const;
   /// Returns true if all texels have an alpha of 255.
   [[nodiscard]] bool is_opaque() const;
@@ -89,14 +96,20 @@ class Texture {
   [[nodiscard]] float coverage() const;
   /// Returns a hash of the name and the texels, the same in every process.
   [[nodiscard]] std::uint64_t hash() const;
-  /// Returns the memory of the texels in bytes.
+  /// Returns the memory of the texels of all levels in bytes, also of a deferred texture.
   [[nodiscard]] std::size_t bytes() const;
+  /// Returns false if the texture is deferred and its texels have not been read.
+  [[nodiscard]] bool has_texels() const;
+  /// Returns true if both share their texels, so that they are equal.
+  [[nodiscard]] bool shares_texels_with(const Texture& other) const { return content_ == other.content_; }
 
   bool operator==(const Texture& other) const;
 
  private:
   struct [[gnu::visibility("hidden")]] Content;
   explicit Texture(std::shared_ptr<const Content> content) : content_(std::move(content)) {}
+  [[nodiscard]] static Result<Texture> made(std::string name, const AlphaImage& image,
+                                            std::function<AlphaImage()> decode);
 
   std::shared_ptr<const Content> content_;
 };

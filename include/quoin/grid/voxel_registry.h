@@ -16,6 +16,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
 #include <quoin/core/function_ref.h>
+#include <quoin/core/parallel.h>
 #include <quoin/core/ref.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
@@ -180,6 +181,12 @@ struct PlacingHit {
 /// Calls `visit` for each face of a type (`faces`, in the order of kDirections) and each face of its shapes that has a
 /// look of its own, in the order of parts, elements and kDirections. Equal textures occur several times.
 void for_each_look(const VoxelProperties& type, FunctionRef<void(const VoxelFace& look)> visit);
+
+class VoxelRegistry;
+
+/// Makes the texels of all deferred textures of types (Texture::deferred) on several threads, for a caller that then
+/// reads them all. Returns the types. Cost: a look at each face if there are none. Memory: all texels, from now on.
+const VoxelRegistry& decode_textures(const VoxelRegistry& types, Threads threads);
 
 /// Returns an error if a registry does not accept a type's properties. The message names the type and the property.
 ///

@@ -394,7 +394,7 @@ struct CpuRenderer::Impl {
       : scene(&of_scene),
         instances(filter),
         tracer(of_scene, filter, threads),
-        surfaces(of_scene.types),
+        surfaces(decode_textures(of_scene.types, threads)),
         environment(environment_of(of_scene)),
         detail(threads) {}
 

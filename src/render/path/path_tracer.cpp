@@ -18,7 +18,7 @@ struct PathTracer::Impl {
   Impl(const Scene& of_scene, InstanceFilter filter, Threads threads)
       : scene(&of_scene),
         tracer(of_scene, filter, threads),
-        surfaces(of_scene.types, Clouds::Scatter),
+        surfaces(decode_textures(of_scene.types, threads), Clouds::Scatter),
         environment(environment_of(of_scene)) {}
 
   const Scene* scene;

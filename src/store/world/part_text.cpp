@@ -125,7 +125,8 @@ std::uint64_t texture_bytes(const VoxelProperties& type) {
     if (texture.is_null() || std::ranges::find(counted, texture) != counted.end()) return;
     counted.push_back(texture);
     const std::uint64_t channels = texture.is_opaque() ? 3 : 4;
-    bytes += (channels * texture.level(0).size() + 2) / 3 * 4;  // base64
+    const auto side = static_cast<std::uint64_t>(texture.size());
+    bytes += (channels * side * side + 2) / 3 * 4;  // base64
   });
   return bytes;
 }

@@ -430,6 +430,7 @@ void DeviceShapes::clear() {
 Status DeviceTextures::put(const VoxelRegistry& types) {
   PendingChanges changes(followed_, types);
   if (changes->empty()) return {};
+  decode_textures(types, {});
   Status done;
   try {
     done = try_put(types);
