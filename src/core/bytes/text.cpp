@@ -121,12 +121,21 @@ std::string printable(std::string_view text) {
   return out;
 }
 
-JsonExtent json_extent(std::string_view text) {
+JsonExtent json_extent(std::string_view text, JsonComments comments) {
   JsonExtent extent;
   int depth = 0;
   bool in_string = false;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
+    if (comments == JsonComments::Allowed && !in_string && c == '/' && i + 1 < text.size()) {
+      const bool is_line = text[i + 1] == '/';
+      if (is_line || text[i + 1] == '*') {
+        const std::size_t end = is_line ? text.find('\n', i) : text.find("*/", i + 2);
+        if (end == std::string_view::npos) break;
+        i = is_line ? end : end + 1;
+        continue;
+      }
+    }
     extent.bytes_outside_strings += in_string ? 0 : 1;
     if (in_string) {
       if (c == '\\') ++i;

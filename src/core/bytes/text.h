@@ -35,9 +35,11 @@ struct JsonExtent {
   std::size_t bytes_outside_strings = 0;  ///< with one byte per string
 };
 
-/// Returns the extent of a text. Compare it with limits before parsing: deep nesting overflows the stack of a recursive
-/// parser.
-[[nodiscard]] JsonExtent json_extent(std::string_view text);
+enum class JsonComments : bool { NotAllowed, Allowed };
+
+/// Returns the extent of a text, outside comments (//, /* */) if they are allowed. Compare it with limits before
+/// parsing: deep nesting overflows the stack of a recursive parser.
+[[nodiscard]] JsonExtent json_extent(std::string_view text, JsonComments comments = JsonComments::NotAllowed);
 
 /// Encodes bytes as base64 with padding (RFC 4648, section 4).
 [[nodiscard]] std::string to_base64(std::span<const std::byte> bytes);
