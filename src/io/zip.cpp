@@ -12,6 +12,7 @@
 
 #include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
+#include "core/rows/packed_row.h"
 #include "io/byte_stream.h"
 
 namespace quoin {

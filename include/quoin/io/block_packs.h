@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include <quoin/core/parallel.h>
 #include <quoin/core/result.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/io/chunk_source.h>
@@ -39,6 +40,7 @@ struct BlockPackReport {
   std::size_t replaced_looks = 0;  ///< blocks with the look of kBuiltinPack, since that of another pack cannot be used
   std::size_t missing_textures = 0;  ///< distinct textures that the packs lack or that cannot be read
   std::size_t missing_models = 0;    ///< distinct models, of the same kind
+  std::size_t without_choices = 0;   ///< blocks whose choices among models have too many parts: one is shown
   std::vector<std::string> names{};  ///< the first 8 of these blocks, textures and models, with the reason
 };
 
@@ -55,7 +57,8 @@ struct BlockPackReport {
 /// Types:    those of worlds, schematics and structures (io/formats.h), also after conversion to .quoin. Each gets
 ///           `faces`, `orientations` and `shapes` by its block's states, and the mean of its textures as colour.
 /// Limits:   docs/formats/packs.md lists them, with the features that are not supported.
-/// Memory:   the bytes of zipped packs, and the textures and models that types use.
+/// Memory:   the bytes of zipped packs, and the models and PNG images that types use. Texels are decoded when they are
+///           first read (Texture::deferred).
 /// Threads:  any number may call `apply` at once.
 class BlockPacks {
  public:
@@ -73,11 +76,17 @@ class BlockPacks {
   BlockPacks& operator=(const BlockPacks&) = delete;
 
   /// Gives the Minecraft blocks of a registry the looks of the packs. Other types, and blocks that the packs do not
-  /// have, stay as they are. Cost: reads each texture and model once.
-  void apply(VoxelRegistry& types);
+  /// have, stay as they are. Cost: reads each texture and model once, textures on several threads.
+  void apply(VoxelRegistry& types, Threads threads = {});
   /// Returns the properties of a type with the looks of the packs.
   [[nodiscard]] VoxelProperties applied(const VoxelProperties& type);
+  /// Decodes the textures of the types from `first` on several threads, so that `applied` finds them. `apply` does so.
+  /// The looks are the same without it.
+  void prepare(const VoxelRegistry& types, std::size_t first = 1, Threads threads = {});
   [[nodiscard]] BlockPackReport report() const;
+  /// Returns a text that differs between packs of different content: it counts the names, sizes and checksums of files
+  /// in zip files, but only the paths of folders.
+  [[nodiscard]] std::string identity() const;
 
  private:
   struct [[gnu::visibility("hidden")]] Content;

@@ -35,6 +35,7 @@ struct ChunkSourceInfo {
   std::vector<std::string> warnings{};    ///< one line per assumption
   std::string dimension{};                ///< Minecraft: the open dimension, "minecraft:overworld"; else empty
   std::vector<std::string> dimensions{};  ///< Minecraft: all dimensions, including the open one
+  std::string packs{};  ///< identity of the resource packs that types have their looks from; empty: none
 };
 
 /// A chunk in the source's voxel types.

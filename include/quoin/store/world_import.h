@@ -31,7 +31,8 @@ struct ImportedWorld {
 /// complete world is then renamed to PATH and replaces an existing file.
 /// Memory:  that of the source and about 100 chunks, for any world.
 /// Errors:  those of WorldStore and ChunkSource::read_part; Cancelled; InvalidArgument if PATH.part is from another
-///          source, or the source's parts have changed. (Changed content within the same parts is not detected.)
+///          source or has the looks of other resource packs, or the source's parts have changed. (Changed content
+///          within the same parts is not detected.)
 [[nodiscard]] Result<ImportedWorld> import_world(const ChunkSource& source, const std::filesystem::path& path,
                                                  Threads threads = {}, const Progress& progress = {});
 

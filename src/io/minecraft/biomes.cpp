@@ -227,6 +227,50 @@ BiomeTints tints_of_biome(std::string_view name) {
   return found != std::end(kBiomes) ? found->tints : BiomeTints();
 }
 
+namespace {
+
+struct ClimateOfTints {
+  std::uint32_t grass;
+  std::uint32_t foliage;
+  Climate climate;
+};
+
+/// Temperature and downfall of the biomes with these colours. Source: the Minecraft Wiki, "Biome" and "Color"
+/// (https://minecraft.wiki/w/Biome, https://minecraft.wiki/w/Color).
+constexpr ClimateOfTints kClimates[] = {
+    {0x91BD59, 0x77AB2F, {0.8F, 0.4F}},        // plains
+    {0x8EB971, 0x71A74D, {0.5F, 0.5F}},        // river
+    {0x80B497, 0x60A17B, {0.0F, 0.5F}},        // snowy plains
+    {0x83B593, 0x64A278, {0.05F, 0.3F}},       // snowy beach
+    {0xBFB755, 0xAEA42A, {1.0F, 0.0F}},        // desert: 2, clamped
+    {0x79C05A, 0x59AE30, {0.7F, 0.8F}},        // forest
+    {0x507A32, 0x59AE30, {0.7F, 0.8F, true}},  // dark forest
+    {0x88BB67, 0x6BA941, {0.6F, 0.6F}},        // birch forest
+    {0x86B783, 0x68A464, {0.25F, 0.8F}},       // taiga
+    {0x86B87F, 0x68A55F, {0.3F, 0.8F}},        // old growth pine taiga
+    {0x59C93C, 0x30BB0B, {0.95F, 0.9F}},       // jungle
+    {0x64C73F, 0x3EB80F, {0.95F, 0.8F}},       // sparse jungle
+    {0x55C93F, 0x2BBB0F, {0.9F, 1.0F}},        // mushroom fields
+    {0x8AB689, 0x6DA36B, {0.2F, 0.3F}},        // windswept hills
+    {0x9ABE4B, 0x82AC1E, {1.0F, 0.3F}},        // stony peaks
+    {0x83BB6D, 0x63A948, {0.5F, 0.8F}},        // meadow
+};
+
+std::optional<Climate> climate_of(std::uint32_t rgb, std::uint32_t ClimateOfTints::*colour) {
+  const auto found = std::ranges::find(kClimates, rgb, colour);
+  return found == std::end(kClimates) ? std::nullopt : std::optional(found->climate);
+}
+
+}  // namespace
+
+std::optional<Climate> climate_of_grass(std::uint32_t rgb) {
+  return climate_of(rgb, &ClimateOfTints::grass);
+}
+
+std::optional<Climate> climate_of_foliage(std::uint32_t rgb) {
+  return climate_of(rgb, &ClimateOfTints::foliage);
+}
+
 std::uint8_t index_of_tints(std::vector<BiomeTints>& all, const BiomeTints& tints) {
   constexpr std::size_t kMost = 255;
   const auto found = std::ranges::find(all, tints);

@@ -24,6 +24,17 @@ struct BiomeTints {
 
 /// Returns the tints of a biome by its name ("minecraft:plains", or a mod's); those of plains if it is unknown.
 [[nodiscard]] BiomeTints tints_of_biome(std::string_view name);
+/// The place of a biome in colour maps: 0 to 1, after clamping.
+struct Climate {
+  float temperature = 0.8F;
+  float downfall = 0.4F;
+  bool is_dark = false;  ///< grass has the mean of the map's colour and 0x28340A
+};
+
+/// Returns the climate of the biomes whose grass or foliage has a colour, by the game's own colour maps; nullopt for
+/// colours that do not come from a map (swamps, badlands) or are unknown.
+[[nodiscard]] std::optional<Climate> climate_of_grass(std::uint32_t rgb);
+[[nodiscard]] std::optional<Climate> climate_of_foliage(std::uint32_t rgb);
 /// Returns the name of a biome by its number before 1.18; "plains" if it is unknown.
 [[nodiscard]] std::string_view name_of_biome(std::int64_t number);
 

@@ -29,6 +29,10 @@ Error wrong_model(const std::string& reason) {
   return make_error(ErrorCode::BadFormat, reason);
 }
 
+Error too_many_parents(const std::string& path) {
+  return make_error(ErrorCode::LimitExceeded, "more than " + std::to_string(kMaxModelParents) + " parents", path);
+}
+
 std::string text_in(const Json& object, const char* key) {
   const auto found = object.find(key);
   return found != object.end() && found->is_string() ? found->get<std::string>() : std::string();
@@ -167,8 +171,7 @@ Status read_model(const Json& json, BlockModel& model) {
     return make_error(ErrorCode::LimitExceeded, "the model has " + std::to_string(elements->size()) +
                                                     " elements: at most " + std::to_string(kMaxModelElements));
   }
-  model.has_elements = true;
-  model.elements.clear();
+  auto own = std::make_shared<std::vector<PackElement>>();
   for (std::size_t i = 0; i < elements->size(); ++i) {
     auto element = element_of((*elements)[i]);
     if (!element) {
@@ -178,30 +181,13 @@ Status read_model(const Json& json, BlockModel& model) {
     }
     const Vec3 size = element->to - element->from;
     const int plates = int{size.x == 0.0F} + int{size.y == 0.0F} + int{size.z == 0.0F};
-    if (plates < 2) model.elements.push_back(std::move(*element));
+    if (plates < 2) own->push_back(std::move(*element));
   }
+  model.shared_elements = std::move(own);
   return {};
 }
 
 }  // namespace
-
-std::optional<ResourceName> resource_name(std::string_view text) {
-  ResourceName name;
-  if (const std::size_t colon = text.find(':'); colon != std::string_view::npos) {
-    name.space = text.substr(0, colon);
-    text.remove_prefix(colon + 1);
-    if (name.space.empty()) name.space = "minecraft";
-  }
-  name.path = text;
-  if (!is_pack_path(name.space) || name.space.find('/') != std::string::npos || !is_pack_path(name.path)) {
-    return std::nullopt;
-  }
-  return name;
-}
-
-std::string to_string(const ResourceName& name) {
-  return name.space + ":" + name.path;
-}
 
 Result<std::optional<Json>> read_pack_json(const PackFiles& pack, const std::string& path) {
   const auto bytes = pack.read(path, kMaxJsonBytes);
@@ -213,7 +199,8 @@ Result<std::optional<Json>> read_pack_json(const PackFiles& pack, const std::str
   if (!*bytes) return std::optional<Json>();
   std::string_view text = text_of(**bytes);
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
-  if (json_extent(text).depth > kMaxJsonDepth) return named(wrong_model("more than 64 levels of brackets"));
+  if (json_extent(text, JsonComments::Allowed).depth > kMaxJsonDepth)
+    return named(wrong_model("more than 64 levels of brackets"));
   Json json = Json::parse(text, nullptr, false, true);
   if (json.is_discarded()) return named(wrong_model("not valid JSON"));
   if (!json.is_object()) return named(wrong_model("not a JSON object"));
@@ -236,41 +223,68 @@ Result<std::shared_ptr<const BlockModel>> ModelReader::model(std::string_view na
   auto resource = resource_name(name);
   if (!resource) return wrong_model("\"" + printable(name.substr(0, 100)) + "\" is not the name of a model");
   if (resource->path.find('/') == std::string::npos) resource->path.insert(0, "block/");
-  return read(*resource, 0);
+  return read(*resource);
 }
 
-Result<std::shared_ptr<const BlockModel>> ModelReader::read(const ResourceName& name, int depth) {
-  const std::string key = to_string(name);
-  if (const auto known = known_.find(key); known != known_.end()) return known->second;
-  const std::string path = "assets/" + name.space + "/models/" + name.path + ".json";
-  const auto remember = [&](Known result) {
-    if (!result && result.error().path.empty()) result.error().path = path;
-    return known_.insert_or_assign(key, std::move(result)).first->second;
-  };
-  if (depth > kMaxModelParents) {
-    return make_error(ErrorCode::LimitExceeded, "more than " + std::to_string(kMaxModelParents) + " parents", path);
+/// A model on the way from the wanted one to its first known ancestor.
+struct ModelReader::Link {
+  std::string key;
+  std::string path;
+  Result<std::optional<Json>> json;
+  std::optional<ResourceName> parent;  // nullopt: none, or the game draws the model by code
+};
+
+/// Reads the models from the wanted one upwards, then makes them from the last one downwards.
+Result<std::shared_ptr<const BlockModel>> ModelReader::read(const ResourceName& name) {
+  std::vector<Link> links;
+  Known parent = std::shared_ptr<const BlockModel>();
+  for (std::optional<ResourceName> next = name; next;) {
+    std::string key = to_string(*next);
+    if (const auto known = known_.find(key); known != known_.end()) {
+      parent = known->second;
+      break;
+    }
+    std::string path = "assets/" + next->space + "/models/" + next->path + ".json";
+    if (const auto same = std::ranges::find(links, key, &Link::key); same != links.end()) {
+      parent = make_error(ErrorCode::BadFormat, "the model is its own ancestor", path);
+      break;
+    }
+    // Only the wanted model is known to have too many: those above it may have fewer.
+    if (links.size() > kMaxModelParents) {
+      return known_.insert_or_assign(links.front().key, Known(too_many_parents(links.front().path))).first->second;
+    }
+    links.push_back({std::move(key), path, read_pack_json(pack_, path), std::nullopt});
+    next.reset();
+    if (!links.back().json || !*links.back().json) continue;
+    next = resource_name(text_in(**links.back().json, "parent"));
+    if (next && next->path.starts_with("builtin/")) next.reset();
+    links.back().parent = next;
   }
-  const auto json = read_pack_json(pack_, path);
-  if (!json) return remember(json.error());
-  if (!*json) return remember(std::shared_ptr<const BlockModel>());
-  BlockModel made;
-  const std::string parent = text_in(**json, "parent");
-  const auto parent_name = resource_name(parent);
-  if (!parent.empty() && !parent_name) {
-    return remember(wrong_model("\"" + printable(parent.substr(0, 100)) + "\" is not the name of a model"));
+  for (auto link = links.rbegin(); link != links.rend(); ++link) {
+    parent = made(*link, parent);
+    if (!parent && parent.error().path.empty()) parent.error().path = link->path;
+    known_.insert_or_assign(link->key, parent);
   }
-  // The game draws models with these parents by code.
-  if (parent_name && !parent_name->path.starts_with("builtin/")) {
-    // Met again below this model, it is an ancestor of itself.
-    known_.insert_or_assign(key, Known(make_error(ErrorCode::BadFormat, "the model is its own ancestor", path)));
-    const auto inherited = read(*parent_name, depth + 1);
-    if (!inherited) return remember(inherited.error());
-    if (*inherited == nullptr)
-      return remember(wrong_model("there is no model " + to_string(*parent_name) + ", its parent"));
-    made = **inherited;
+  return parent;
+}
+
+Result<std::shared_ptr<const BlockModel>> ModelReader::made(const Link& link, const Known& parent) const {
+  if (!link.json) return link.json.error();
+  if (!*link.json) return std::shared_ptr<const BlockModel>();
+  const Json& json = **link.json;
+  const std::string name = text_in(json, "parent");
+  if (!name.empty() && !resource_name(name)) {
+    return wrong_model("\"" + printable(name.substr(0, 100)) + "\" is not the name of a model");
   }
-  if (auto done = read_model(**json, made); !done) return remember(done.error());
-  return remember(std::make_shared<const BlockModel>(std::move(made)));
+  BlockModel model;
+  if (link.parent) {
+    if (!parent) return parent.error();
+    if (*parent == nullptr) return wrong_model("there is no model " + to_string(*link.parent) + ", its parent");
+    model = **parent;
+    if (++model.parents > kMaxModelParents) return too_many_parents(link.path);
+  }
+  if (auto done = read_model(json, model); !done) return done.error();
+  return std::make_shared<const BlockModel>(std::move(model));
 }
 
 }  // namespace quoin::packs

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -28,19 +29,6 @@ namespace quoin::packs {
 inline constexpr std::size_t kMaxModelElements = 4 * kMaxShapeElements;
 /// Maximum number of a model's parents.
 inline constexpr int kMaxModelParents = 32;
-
-/// A name in a pack: "minecraft:block/stone".
-struct ResourceName {
-  std::string space = "minecraft";
-  std::string path;
-
-  bool operator==(const ResourceName&) const = default;
-};
-
-/// Splits "block/stone" or "minecraft:block/stone". Returns nullopt for names that are no pack paths.
-[[nodiscard]] std::optional<ResourceName> resource_name(std::string_view text);
-/// "minecraft:block/stone".
-[[nodiscard]] std::string to_string(const ResourceName& name);
 
 /// Reads and parses a JSON file of a pack; comments are allowed. Returns nullopt if the pack does not have it.
 /// Errors: those of PackFiles::read; BadFormat, also for more than 64 levels of brackets. They name the file.
@@ -65,8 +53,14 @@ struct PackElement {
 /// A model with the content of its parents.
 struct BlockModel {
   std::map<std::string, std::string, std::less<>> textures{};  ///< by name without '#'
-  std::vector<PackElement> elements{};
-  bool has_elements = false;  ///< the model or a parent lists elements, if only none
+  /// The elements of the model, or of its nearest parent with some; shared with it. Null: none lists elements.
+  std::shared_ptr<const std::vector<PackElement>> shared_elements{};
+  int parents = 0;  ///< number of parents
+
+  /// Returns the elements; none if no model lists them.
+  [[nodiscard]] std::span<const PackElement> elements() const {
+    return shared_elements == nullptr ? std::span<const PackElement>() : std::span(*shared_elements);
+  }
 
   /// Returns the texture that a face's text names, after all references; nullopt if there is none.
   [[nodiscard]] std::optional<ResourceName> texture(std::string_view text) const;
@@ -86,7 +80,9 @@ class ModelReader {
 
  private:
   using Known = Result<std::shared_ptr<const BlockModel>>;
-  [[nodiscard]] Known read(const ResourceName& name, int depth);
+  struct Link;
+  [[nodiscard]] Known read(const ResourceName& name);
+  [[nodiscard]] Known made(const Link& link, const Known& parent) const;
 
   const PackFiles& pack_;
   std::map<std::string, Known> known_;

@@ -33,8 +33,8 @@ TEST(BlockModels, InheritsTexturesAndElements) {
   ModelReader reader(*files);
   const auto model = reader.model("stone");  // names without a folder lie in block
   ASSERT_TRUE(model && *model);
-  ASSERT_EQ((*model)->elements.size(), 1U);
-  const auto& up = (*model)->elements[0].faces[2];
+  ASSERT_EQ((*model)->elements().size(), 1U);
+  const auto& up = (*model)->elements()[0].faces[2];
   ASSERT_TRUE(up);
   EXPECT_EQ((*model)->texture(up->texture), (ResourceName{"minecraft", "block/stone"}));
   EXPECT_EQ(reader.model("minecraft:block/stone")->get(), model->get()) << "each is read once";
@@ -51,7 +51,7 @@ TEST(BlockModels, ReadsElements) {
   ModelReader reader(*files);
   const auto model = reader.model("block/a");
   ASSERT_TRUE(model && *model) << model_error(pack, "block/a");
-  const PackElement& element = (*model)->elements.at(0);
+  const PackElement& element = (*model)->elements()[0];
   EXPECT_EQ(element.from, Vec3(0.0F, 0.0F, -16.0F));
   EXPECT_EQ(element.to, Vec3(16.0F, 32.0F, 0.5F));
   EXPECT_EQ(element.turn, (ElementTurn{Vec3(8.0F, 0.0F, 8.0F), 0, -22.5F, true}));
@@ -84,6 +84,49 @@ TEST(BlockModels, RefusesCyclesAndMissingParents) {
   EXPECT_EQ(model_error(pack, "block/absent"), "absent");
 }
 
+TEST(BlockModels, LongChainsLeaveNoErrorsForTheirParents) {
+  PackBuilder pack;
+  for (int i = 0; i < 40; ++i) {
+    pack.model("chain/" + std::to_string(i), R"({"parent": "chain/)" + std::to_string(i + 1) + "\"}");
+  }
+  pack.model("chain/40", "{}");
+  const auto files = pack.files();
+  for (const bool from_below : {true, false}) {
+    ModelReader reader(*files);
+    for (int k = 0; k <= 40; ++k) {
+      const int i = from_below ? k : 40 - k;
+      const auto model = reader.model("chain/" + std::to_string(i));
+      EXPECT_EQ(model.has_value(), 40 - i <= kMaxModelParents) << i;
+      EXPECT_EQ(model ? "" : model.error().message, 40 - i <= kMaxModelParents ? "" : "more than 32 parents");
+    }
+  }
+}
+
+TEST(BlockModels, ChildrenShareTheElementsOfParents) {
+  PackBuilder pack;
+  pack.model("block/parent", R"({"elements": [{"from": [0, 0, 0], "to": [16, 16, 16]}]})");
+  pack.model("block/child", R"({"parent": "block/parent", "textures": {"all": "block/a"}})");
+  pack.model("block/other", R"({"parent": "block/parent", "elements": []})");
+  const auto files = pack.files();
+  ModelReader reader(*files);
+  const auto parent = *reader.model("block/parent");
+  EXPECT_EQ((*reader.model("block/child"))->shared_elements, parent->shared_elements);
+  EXPECT_EQ(parent->elements().size(), 1U);
+  EXPECT_TRUE((*reader.model("block/other"))->elements().empty());
+}
+
+// A quote in a comment would hide the brackets after it.
+TEST(BlockModels, CommentsDoNotHideDeepJson) {
+  const std::string deep = std::string(100, '[') + std::string(100, ']');
+  PackBuilder pack;
+  pack.model("block/line", "// \"\n{\"a\": " + deep + "}");
+  pack.model("block/block", "/* \" */{\"a\": " + deep + "}");
+  pack.model("block/good", "/* [[[ */ {\"a\": 1} // " + deep);
+  EXPECT_NE(model_error(pack, "block/line").find("64 levels"), std::string::npos);
+  EXPECT_NE(model_error(pack, "block/block").find("64 levels"), std::string::npos);
+  EXPECT_EQ(model_error(pack, "block/good"), "");
+}
+
 TEST(BlockModels, ModelsThatTheGameDrawsHaveNoElements) {
   PackBuilder pack;
   pack.model("block/chest", R"({"parent": "builtin/entity", "textures": {"particle": "block/oak_planks"}})");
@@ -91,7 +134,7 @@ TEST(BlockModels, ModelsThatTheGameDrawsHaveNoElements) {
   ModelReader reader(*files);
   const auto model = reader.model("block/chest");
   ASSERT_TRUE(model && *model);
-  EXPECT_FALSE((*model)->has_elements);
+  EXPECT_TRUE((*model)->elements().empty());
 }
 
 TEST(BlockModels, RefusesWrongElements) {

@@ -28,12 +28,19 @@ std::string counted(std::size_t count, const char* one, const char* many) {
 class PackedSource final : public ChunkSource {
  public:
   PackedSource(std::unique_ptr<ChunkSource> source, std::shared_ptr<BlockPacks> packs)
-      : ChunkSource(source->info(), {source->parts().begin(), source->parts().end()}),
+      : ChunkSource(with_identity(source->info(), *packs), {source->parts().begin(), source->parts().end()}),
         source_(std::move(source)),
         packs_(std::move(packs)) {}
 
   [[nodiscard]] VoxelRegistry types() const override {
     const VoxelRegistry plain = source_->types();
+    std::size_t first = 0;
+    {
+      const std::scoped_lock lock(mutex_);
+      first = types_.size();
+    }
+    // Without the lock: a thread that waits for the others may meanwhile be asked for types.
+    if (first < plain.size()) packs_->prepare(plain, first);
     const std::scoped_lock lock(mutex_);
     while (types_.size() < plain.size()) {
       const auto added = types_.add(packs_->applied(plain[static_cast<VoxelType>(types_.size())]));
@@ -45,6 +52,11 @@ class PackedSource final : public ChunkSource {
   [[nodiscard]] Result<SourcePart> read_part(std::size_t part) const override { return source_->read_part(part); }
 
  private:
+  static ChunkSourceInfo with_identity(ChunkSourceInfo info, const BlockPacks& packs) {
+    info.packs += (info.packs.empty() ? "" : "; ") + packs.identity();
+    return info;
+  }
+
   std::unique_ptr<ChunkSource> source_;
   std::shared_ptr<BlockPacks> packs_;
   mutable std::mutex mutex_;
@@ -63,9 +75,13 @@ std::string to_string(const BlockPackReport& report) {
   if (report.replaced_looks > 0) add(counted(report.replaced_looks, "look", "looks") + " replaced by the own pack");
   if (report.missing_textures > 0) add(counted(report.missing_textures, "texture", "textures") + " missing");
   if (report.missing_models > 0) add(counted(report.missing_models, "model", "models") + " missing");
+  if (report.without_choices > 0) {
+    add(counted(report.without_choices, "block type", "block types") + " without choices by position");
+  }
   std::string names;
   for (const std::string& name : report.names) names += (names.empty() ? ": " : ", ") + name;
-  const std::size_t all = report.without_look + report.replaced_looks + report.missing_textures + report.missing_models;
+  const std::size_t all = report.without_look + report.replaced_looks + report.missing_textures +
+                          report.missing_models + report.without_choices;
   return text + names + (report.names.size() < all ? ", ..." : "");
 }
 
@@ -89,7 +105,9 @@ Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::vector<std::vector<std
 struct BlockPacks::Content {
   struct {
     [[nodiscard]] static VoxelProperties applied(const VoxelProperties& type) { return type; }
+    static void prepare(const VoxelRegistry& /*types*/, std::size_t /*first*/, Threads /*threads*/) {}
     [[nodiscard]] static BlockPackReport report() { return {}; }
+    [[nodiscard]] static std::string identity() { return {}; }
   } looks;
 };
 
@@ -126,6 +144,7 @@ class LazyOwnPack final : public packs::PackFiles {
                                                                    std::size_t max_bytes) const override {
     return packs::OwnPack::instance()->read(path, max_bytes);
   }
+  [[nodiscard]] std::string identity() const override { return "builtin"; }
 };
 
 }  // namespace
@@ -161,7 +180,8 @@ Result<std::string> hash_of_pack(const std::filesystem::path& path) {
 BlockPacks::BlockPacks(std::unique_ptr<Content> content) : content_(std::move(content)) {}
 BlockPacks::~BlockPacks() = default;
 
-void BlockPacks::apply(VoxelRegistry& types) {
+void BlockPacks::apply(VoxelRegistry& types, Threads threads) {
+  prepare(types, 1, threads);
   for (std::size_t i = 1; i < types.size(); ++i) {
     const auto type = static_cast<VoxelType>(i);
     VoxelProperties made = content_->looks.applied(types[type]);
@@ -171,6 +191,14 @@ void BlockPacks::apply(VoxelRegistry& types) {
 
 VoxelProperties BlockPacks::applied(const VoxelProperties& type) {
   return content_->looks.applied(type);
+}
+
+void BlockPacks::prepare(const VoxelRegistry& types, std::size_t first, Threads threads) {
+  content_->looks.prepare(types, first, threads);
+}
+
+std::string BlockPacks::identity() const {
+  return content_->looks.identity();
 }
 
 BlockPackReport BlockPacks::report() const {

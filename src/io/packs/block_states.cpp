@@ -1,9 +1,11 @@
 #include "io/packs/block_states.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <nlohmann/json.hpp>
+#include <quoin/core/assert.h>
 
 namespace quoin::packs {
 
@@ -14,6 +16,7 @@ using Alternatives = std::vector<std::vector<StateTerm>>;
 
 constexpr int kMaxConditionDepth = 8;
 constexpr std::size_t kMaxModelChoices = 256;
+constexpr double kMaxWeight = 1e6;
 constexpr std::size_t kMaxTerms = 64;                // of an alternative
 constexpr std::size_t kMaxAllAlternatives = 16'384;  // of a file
 // Values that a file's products may copy. A short file could otherwise repeat a long list of values many times.
@@ -69,7 +72,7 @@ Result<StateModel> state_model(const Json& json) {
   return model;
 }
 
-/// Reads a model or a list of models with weights, the heaviest first.
+/// Reads a model or a list of models with weights.
 Result<std::vector<StateModel>> state_models(const Json& json) {
   if (!json.is_array()) {
     auto one = state_model(json);
@@ -79,20 +82,18 @@ Result<std::vector<StateModel>> state_models(const Json& json) {
   if (json.empty()) return wrong_states("a case names no model");
   if (json.size() > kMaxModelChoices) return too_many("models to choose from", kMaxModelChoices);
   std::vector<StateModel> models;
-  double heaviest = 0.0;
-  std::size_t first = 0;
   for (const Json& each : json) {
     auto one = state_model(each);
     if (!one) return one.error();
-    const auto weight = each.find("weight");
-    const double heavy = weight != each.end() && weight->is_number() ? weight->get<double>() : 1.0;
-    if (heavy > heaviest) {
-      heaviest = heavy;
-      first = models.size();
+    if (const auto weight = each.find("weight"); weight != each.end()) {
+      const double number = weight->is_number() ? weight->get<double>() : 0.0;
+      if (!(number >= 1.0 && number <= kMaxWeight) || number != std::floor(number)) {
+        return wrong_states("a weight is not a whole number from 1 to 1,000,000");
+      }
+      one->weight = static_cast<int>(number);
     }
     models.push_back(std::move(*one));
   }
-  std::swap(models.front(), models[first]);
   return models;
 }
 
@@ -222,6 +223,11 @@ Result<BlockStates> parse_multipart(const Json& json) {
 }
 
 }  // namespace
+
+const StateModel& StateCase::heaviest() const {
+  QUOIN_ASSERT(!models.empty(), "a case with models");
+  return *std::ranges::max_element(models, {}, &StateModel::weight);
+}
 
 Result<BlockStates> parse_block_states(const Json& json) {
   if (!json.is_object()) return wrong_states("not a JSON object");

@@ -25,6 +25,7 @@ struct StateModel {
   int x = 0;  ///< quarter turns about x, then about y, clockwise seen from the positive end of the axis
   int y = 0;
   bool keeps_uv = false;  ///< textures keep their place in the world when the model is turned
+  int weight = 1;         ///< number of chances to be chosen by position, at least 1
 };
 
 /// A property must have one of the values, or none of them.
@@ -38,8 +39,11 @@ struct StateTerm {
 struct StateCase {
   /// The case holds if any of these alternatives does. An alternative holds if all its terms do; without terms, always.
   std::vector<std::vector<StateTerm>> when;
-  /// Models to choose from by position. Their weights are not kept: the heaviest is the first.
+  /// Models to choose from by position, in the order of the file.
   std::vector<StateModel> models;
+
+  /// Returns the model with the greatest weight, the first of several.
+  [[nodiscard]] const StateModel& heaviest() const;
 };
 
 /// The content of a block-state file.
@@ -49,7 +53,8 @@ struct BlockStates {
 };
 
 /// Reads a block-state file.
-/// Errors: BadFormat for JSON of another form; LimitExceeded for kMaxStateCases and kMaxStateAlternatives.
+/// Errors: BadFormat for JSON of another form, also for weights that are not whole numbers from 1 to 1,000,000;
+///         LimitExceeded for kMaxStateCases and kMaxStateAlternatives.
 [[nodiscard]] Result<BlockStates> parse_block_states(const nlohmann::json& json);
 
 }  // namespace quoin::packs

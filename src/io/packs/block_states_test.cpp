@@ -5,6 +5,9 @@
 #include <string>
 #include <vector>
 
+#include <algorithm>
+#include <random>
+
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -34,7 +37,7 @@ std::multiset<std::string> shown(const std::string& text, const packs_test::Type
     EXPECT_TRUE(conditions);
     for (const ShapeCondition& condition : *conditions) {
       if (!holds(condition, block.state)) continue;
-      models.insert(each.models.front().model);
+      models.insert(each.heaviest().model);
       break;
     }
   }
@@ -56,7 +59,7 @@ TEST(BlockStates, ChoosesVariantsByState) {
   EXPECT_EQ(shown(stairs, block("south", "top")), Models{});
   const auto states = states_from(stairs);
   bool has_lock = false;
-  for (const StateCase& each : states->cases) has_lock |= each.models.front().keeps_uv && each.models.front().x == 2;
+  for (const StateCase& each : states->cases) has_lock |= each.heaviest().keeps_uv && each.heaviest().x == 2;
   EXPECT_TRUE(has_lock);
 }
 
@@ -111,19 +114,64 @@ TEST(BlockStates, ConnectsFencesOfOldWorlds) {
   EXPECT_TRUE(TypeStates(vine.type).conditions(states->cases[0])->empty());
 }
 
-TEST(BlockStates, TakesTheHeaviestModelFirst) {
+TEST(BlockStates, KeepsWeightsInTheOrderOfTheFile) {
   const auto states =
-      states_from(R"({"variants": {"": [{"model": "a"}, {"model": "b", "weight": 5}, {"model": "c"}]}})");
+      states_from(R"({"variants": {"": [{"model": "a"}, {"model": "b", "weight": 5}, {"model": "c", "weight": 5}]}})");
   ASSERT_TRUE(states);
-  ASSERT_EQ(states->cases.at(0).models.size(), 3U);
-  EXPECT_EQ(states->cases[0].models[0].model, "b");
+  const StateCase& each = states->cases.at(0);
+  ASSERT_EQ(each.models.size(), 3U);
+  EXPECT_EQ(each.models[0].model, "a");
+  EXPECT_EQ(each.models[0].weight, 1);
+  EXPECT_EQ(each.models[1].weight, 5);
+  EXPECT_EQ(each.heaviest().model, "b");
+}
+
+// The conditions that are left are checked in all states, with all sides and corners.
+TEST(BlockStates, EarlierConditionsTakeStatesAway) {
+  const auto fits = [](const ShapeCondition& one, std::uint32_t state, std::uint8_t sides, StairCorner corner) {
+    return holds(one, state) && (one.connected.bits() & ~sides) == 0 && (one.unconnected.bits() & sides) == 0 &&
+           (!one.corner || *one.corner == corner);
+  };
+  const auto any_fits = [&](const std::vector<ShapeCondition>& all, std::uint32_t state, std::uint8_t sides,
+                            StairCorner corner) {
+    return std::ranges::count_if(all, [&](const ShapeCondition& one) { return fits(one, state, sides, corner); });
+  };
+  std::mt19937 random(7);
+  const auto random_condition = [&] {
+    ShapeCondition made;
+    made.state_mask = static_cast<std::uint32_t>(random() & random() & 15U);
+    made.state = static_cast<std::uint32_t>(random()) & made.state_mask;
+    const auto sides = static_cast<std::uint8_t>(random() & random() & 7U);
+    const auto others = static_cast<std::uint8_t>(random() & random() & 7U & ~sides);
+    made.connected = DirectionSet::from_bits(sides);
+    made.unconnected = DirectionSet::from_bits(others);
+    if (random() % 3 == 0) made.corner = static_cast<StairCorner>(random() % 5);
+    return made;
+  };
+  for (int i = 0; i < 300; ++i) {
+    const std::vector<ShapeCondition> all = {random_condition()};
+    std::vector<ShapeCondition> taken;
+    for (int k = 0; k < i % 4; ++k) taken.push_back(random_condition());
+    const auto left = conditions_without(all, taken);
+    ASSERT_TRUE(left);
+    for (std::uint32_t number = 0; number < 16 * 8 * 5; ++number) {
+      const std::uint32_t state = number % 16;
+      const auto sides = static_cast<std::uint8_t>(number / 16 % 8);
+      const auto corner = static_cast<StairCorner>(number / 128);
+      const bool is_wanted = any_fits(all, state, sides, corner) != 0 && any_fits(taken, state, sides, corner) == 0;
+      ASSERT_EQ(any_fits(*left, state, sides, corner), is_wanted ? 1 : 0) << "never twice";
+    }
+  }
 }
 
 TEST(BlockStates, RefusesWrongFiles) {
   EXPECT_EQ(states_error(R"({"variants": {"": {"model": "a"}}})"), "");
   for (const char* wrong :
        {"{}", R"({"variants": []})", R"({"variants": {"": {}}})", R"({"variants": {"": []}})",
-        R"({"variants": {"": 1}})", R"({"variants": {"a": {"model": "a"}}})",
+        R"({"variants": {"": 1}})", R"({"variants": {"": [{"model": "a", "weight": 0}]}})",
+        R"({"variants": {"": [{"model": "a", "weight": 1.5}]}})",
+        R"({"variants": {"": [{"model": "a", "weight": "2"}]}})",
+        R"({"variants": {"": [{"model": "a", "weight": 1e7}]}})", R"({"variants": {"a": {"model": "a"}}})",
         R"({"variants": {"": {"model": "a", "x": 45}}})", R"({"variants": {"": {"model": "a", "y": "90"}}})",
         R"({"multipart": {}})", R"({"multipart": [1]})", R"({"multipart": [{"when": {"a": "b"}}]})",
         R"({"multipart": [{"apply": {"model": "a"}, "when": 1}]})",

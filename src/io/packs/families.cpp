@@ -43,9 +43,9 @@ std::optional<std::array<float, kCount>> family_numbers(std::string_view text, f
 }
 
 /// Puts the texts that a pattern's stars stand for, and the name, into a text.
-std::string filled(std::string text, const PackName& block, const std::vector<std::string>& stars) {
+std::string filled(std::string text, const ResourceName& block, const std::vector<std::string>& stars) {
   text = with_stars(std::move(text), stars);
-  return replaced(replaced(std::move(text), "{name}", block.name), "{space}", block.space);
+  return replaced(replaced(std::move(text), "{name}", block.path), "{space}", block.space);
 }
 
 }  // namespace
@@ -72,12 +72,6 @@ std::string with_stars(std::string text, const std::vector<std::string>& stars) 
     text = replaced(std::move(text), "{" + std::to_string(i + 1) + "}", stars[i]);
   }
   return text;
-}
-
-PackName pack_name(std::string_view text) {
-  const std::size_t colon = text.find(':');
-  if (colon == std::string_view::npos) return {"minecraft", std::string(text)};
-  return {std::string(text.substr(0, colon)), std::string(text.substr(colon + 1))};
 }
 
 std::optional<std::vector<std::string>> match_name(std::string_view pattern, std::string_view name) {
@@ -385,6 +379,7 @@ struct BlockFamilies::Parser {
         for (const auto& [end, model] : value.items()) {
           std::vector<std::string> parts = words(model.is_string() ? model.get<std::string>() : "");
           if (parts.empty() || !out.models_.contains(parts[0])) return fault("no model for " + end);
+          out.model_ends_.insert(end);
           ModelUse& use = made.models[end];
           use.model = parts[0];
           for (std::size_t i = 1; i < parts.size(); ++i) use.renamed.push_back(split(parts[i], '='));
@@ -474,13 +469,13 @@ Result<BlockFamilies> BlockFamilies::from_text(std::string_view families, std::s
   return made;
 }
 
-BlockFamilies::Found BlockFamilies::find(const PackName& block, int depth) const {
-  auto match = names_.find(texture_space_.empty() ? block.name : block.space + ":" + block.name);
+BlockFamilies::Found BlockFamilies::find(const ResourceName& block, int depth) const {
+  auto match = names_.find(texture_space_.empty() ? block.path : block.space + ":" + block.path);
   QUOIN_ASSERT(match, "a rule for all names");
   const Rule& rule = rules_[match->row];
   if (rule.family.starts_with('=')) {
     const std::string name = filled(rule.family.substr(1), block, match->stars);
-    const PackName other = texture_space_.empty() ? PackName{block.space, name} : pack_name(name);
+    const ResourceName other = texture_space_.empty() ? ResourceName{block.space, name} : split_resource_name(name);
     if (depth < kMaxAliases) return find(other, depth + 1);
     match->row = names_.find("?")->row;
   }
@@ -491,9 +486,9 @@ BlockFamilies::Found BlockFamilies::find(const PackName& block, int depth) const
 
 /// Returns the blocks that may be the material of a block, the likeliest first, and whether only a rule of this name
 /// counts.
-std::vector<std::pair<PackName, bool>> BlockFamilies::materials(const Found& found) const {
+std::vector<std::pair<ResourceName, bool>> BlockFamilies::materials(const Found& found) const {
   const std::string& space = found.block.space;
-  const std::string base = found.stars.empty() ? found.block.name : found.stars[0];
+  const std::string base = found.stars.empty() ? found.block.path : found.stars[0];
   if (texture_space_.empty()) {
     // Bamboo has planks and a block, quartz only a block; other names may be woods of mods.
     return {{{space, base}, false},
@@ -503,7 +498,7 @@ std::vector<std::pair<PackName, bool>> BlockFamilies::materials(const Found& fou
             {{space, base + "_planks"}, false}};
   }
   // The last star is the name of a material, of the game's own mods or of the same mod.
-  const std::string& name = found.stars.empty() ? found.block.name : found.stars.back();
+  const std::string& name = found.stars.empty() ? found.block.path : found.stars.back();
   return {{{"default", name}, false}, {{"farming", name}, true}, {{space, name}, false}};
 }
 
@@ -513,7 +508,7 @@ std::string BlockFamilies::texture_of_material(const Found& found, std::string_v
       {"bottom", {"bottom", "end", "top", "all", "side"}},
       {"side", {"side", "all", "front"}},
   };
-  const std::vector<std::pair<PackName, bool>> candidates = materials(found);
+  const std::vector<std::pair<ResourceName, bool>> candidates = materials(found);
   for (const auto& [name, is_listed] : candidates) {
     const Found material = find(name);
     if (material.is_fallback || !material.family->is_full || (is_listed && !material.is_exact)) continue;
@@ -525,26 +520,26 @@ std::string BlockFamilies::texture_of_material(const Found& found, std::string_v
       }
     }
   }
-  const PackName& last = candidates.back().first;
-  return texture_space_.empty() ? "quoin:block/" + last.space + "/" + last.name
-                                : texture_space_ + ":block/" + last.space + "_" + last.name;
+  const ResourceName& last = candidates.back().first;
+  return texture_space_.empty() ? "quoin:block/" + last.space + "/" + last.path
+                                : texture_space_ + ":block/" + last.space + "_" + last.path;
 }
 
 std::string BlockFamilies::texture(const Found& found, const std::string& text) const {
   if (text.starts_with('@')) return texture_of_material(found, std::string_view(text).substr(1));
-  const PackName named = pack_name(filled(text, found.block, found.stars));
+  const ResourceName named = split_resource_name(filled(text, found.block, found.stars));
   const bool has_space = text.find(':') != std::string::npos;
-  const bool has_folder = named.name.starts_with("block/") || named.name.starts_with("entity/");
+  const bool has_folder = named.path.starts_with("block/") || named.path.starts_with("entity/");
   const std::string& space = texture_space_.empty() ? found.block.space : texture_space_;
-  return (has_space ? named.space : space) + ":" + (has_folder ? "" : "block/") + named.name;
+  return (has_space ? named.space : space) + ":" + (has_folder ? "" : "block/") + named.path;
 }
 
-std::string BlockFamilies::model_name(const PackName& block, const Found& found, const std::string& end) const {
-  if (found.is_fallback) return "quoin:block/" + block.space + "/" + block.name + end;
-  return block.space + ":block/" + block.name + end;
+std::string BlockFamilies::model_name(const ResourceName& block, const Found& found, const std::string& end) const {
+  if (found.is_fallback) return "quoin:block/" + block.space + "/" + block.path + end;
+  return block.space + ":block/" + block.path + end;
 }
 
-std::string BlockFamilies::block_state(const PackName& block) const {
+std::string BlockFamilies::block_state(const ResourceName& block) const {
   const Found found = find(block);
   Json file = Json::object();
   for (const State& state : found.family->states) {
@@ -594,21 +589,22 @@ std::string BlockFamilies::model_json(const std::vector<Box>& boxes, const Pairs
   return file.dump();
 }
 
-std::optional<std::string> BlockFamilies::model(const PackName& model) const {
+std::optional<std::string> BlockFamilies::model(const ResourceName& model) const {
   constexpr std::string_view kFolder = "block/";
-  if (!model.name.starts_with(kFolder)) return std::nullopt;
-  PackName block{model.space, model.name.substr(kFolder.size())};
-  const bool is_fallback = model.space == "quoin" && block.name.find('/') != std::string::npos;
-  if (is_fallback) std::tie(block.space, block.name) = split(block.name, '/');
-  const auto made = [&](const PackName& name, const std::string& end) -> std::optional<std::string> {
-    const Found found = find(name);
-    if (found.is_fallback != is_fallback) return std::nullopt;
+  if (!model.path.starts_with(kFolder)) return std::nullopt;
+  ResourceName block{model.space, model.path.substr(kFolder.size())};
+  const bool is_fallback = model.space == "quoin" && block.path.find('/') != std::string::npos;
+  if (is_fallback) std::tie(block.space, block.path) = split(block.path, '/');
+  const auto made = [&](const ResourceName& name, const std::string& end) -> std::optional<std::string> {
     std::string base = end;
     int turns = 0;  // of "_turn1" to "_turn3"
     if (end.size() >= 6 && end.substr(end.size() - 6, 5) == "_turn" && end.back() >= '1' && end.back() <= '3') {
       turns = end.back() - '0';
       base = end.substr(0, end.size() - 6);
     }
+    if (!model_ends_.contains(base)) return std::nullopt;  // searching for a rule costs more
+    const Found found = find(name);
+    if (found.is_fallback != is_fallback) return std::nullopt;
     const auto local = found.family->models.find(base);
     if (local == found.family->models.end()) return std::nullopt;
     Pairs textures;
@@ -628,28 +624,28 @@ std::optional<std::string> BlockFamilies::model(const PackName& model) const {
     }
     return model_json(boxes, textures, found.rule->tinted);
   };
-  for (std::size_t at = block.name.find('_', 1); at != std::string::npos; at = block.name.find('_', at + 1)) {
-    if (auto json = made({block.space, block.name.substr(0, at)}, block.name.substr(at))) return json;
+  for (std::size_t at = block.path.find('_', 1); at != std::string::npos; at = block.path.find('_', at + 1)) {
+    if (auto json = made({block.space, block.path.substr(0, at)}, block.path.substr(at))) return json;
   }
   if (auto json = made(block, "")) return json;
   // Models of other packs refer to published parents, such as cube_all: models whose textures are still variables.
-  const auto parent = models_.find(block.name);
+  const auto parent = models_.find(block.path);
   if (block.space != "minecraft" || is_fallback || parent == models_.end()) return std::nullopt;
   return model_json(parent->second, {}, {});
 }
 
-BlockFamilies::Traits BlockFamilies::traits(const PackName& block) const {
+BlockFamilies::Traits BlockFamilies::traits(const ResourceName& block) const {
   const Found found = find(block);
   Traits traits = found.family->traits;
   traits.is_fallback = found.is_fallback;
   return traits;
 }
 
-std::string BlockFamilies::family(const PackName& block) const {
+std::string BlockFamilies::family(const ResourceName& block) const {
   return find(block).rule->family;
 }
 
-bool BlockFamilies::is_known(const PackName& block) const {
+bool BlockFamilies::is_known(const ResourceName& block) const {
   return !find(block).is_fallback;
 }
 

@@ -3,8 +3,10 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -13,21 +15,12 @@
 
 #include <quoin/core/result.h>
 
+#include "io/packs/pack_files.h"
+
 // Block families: tables that give every block name, also of mods, its block states, models and textures in the
 // published resource-pack format. docs/formats/block_pack.md describes the tables.
 
 namespace quoin::packs {
-
-/// A name with a namespace: "minecraft" and "oak_stairs".
-struct PackName {
-  std::string space = "minecraft";
-  std::string name;
-
-  bool operator==(const PackName&) const = default;
-};
-
-/// Splits "minecraft:oak_stairs"; names without a namespace are Minecraft's.
-[[nodiscard]] PackName pack_name(std::string_view text);
 
 /// Returns the parts of a text that are not empty.
 [[nodiscard]] std::vector<std::string> words(std::string_view text, char between = ' ');
@@ -72,9 +65,9 @@ class BlockFamilies {
                                                        std::string_view texture_space = {});
 
   /// Returns the block-state file of a block as JSON. Every name has one.
-  [[nodiscard]] std::string block_state(const PackName& block) const;
+  [[nodiscard]] std::string block_state(const ResourceName& block) const;
   /// Returns a model file as JSON; nullopt if no block state refers to it and it is no published parent.
-  [[nodiscard]] std::optional<std::string> model(const PackName& model) const;
+  [[nodiscard]] std::optional<std::string> model(const ResourceName& model) const;
   /// The properties of a family that block-state files cannot have.
   struct Traits {
     std::string turn;          ///< the rule by which a number in the state turns the block; empty: none
@@ -83,11 +76,11 @@ class BlockFamilies {
     bool joins_full_sides = false;
     bool is_fallback = false;  ///< the rule for all names
   };
-  [[nodiscard]] Traits traits(const PackName& block) const;
+  [[nodiscard]] Traits traits(const ResourceName& block) const;
   /// Returns the name of the family.
-  [[nodiscard]] std::string family(const PackName& block) const;
+  [[nodiscard]] std::string family(const ResourceName& block) const;
   /// Returns true if a rule other than the last one, which makes cubes of all names, matches.
-  [[nodiscard]] bool is_known(const PackName& block) const;
+  [[nodiscard]] bool is_known(const ResourceName& block) const;
   /// Returns the number of rules.
   [[nodiscard]] std::size_t rule_count() const { return rules_.size(); }
 
@@ -130,24 +123,25 @@ class BlockFamilies {
   struct Found {
     const Rule* rule = nullptr;
     const Family* family = nullptr;
-    PackName block;  // the block whose rule it is: without "waxed_"
+    ResourceName block;  // the block whose rule it is: without "waxed_"
     std::vector<std::string> stars;
     bool is_fallback = false;
     bool is_exact = false;
   };
   struct Parser;
 
-  [[nodiscard]] Found find(const PackName& block, int depth = 0) const;
+  [[nodiscard]] Found find(const ResourceName& block, int depth = 0) const;
   [[nodiscard]] std::string texture(const Found& found, const std::string& text) const;
   [[nodiscard]] std::string texture_of_material(const Found& found, std::string_view side) const;
-  [[nodiscard]] std::vector<std::pair<PackName, bool>> materials(const Found& found) const;
-  [[nodiscard]] std::string model_name(const PackName& block, const Found& found, const std::string& end) const;
+  [[nodiscard]] std::vector<std::pair<ResourceName, bool>> materials(const Found& found) const;
+  [[nodiscard]] std::string model_name(const ResourceName& block, const Found& found, const std::string& end) const;
   [[nodiscard]] std::string model_json(const std::vector<Box>& boxes,
                                        const std::vector<std::pair<std::string, std::string>>& textures,
                                        const std::vector<std::string>& tinted) const;
 
   std::map<std::string, std::vector<Box>> models_;
   std::map<std::string, Family> families_;
+  std::set<std::string, std::less<>> model_ends_;  // of all families
   std::vector<Rule> rules_;
   NamePatterns names_;
   std::string texture_space_;  // see from_text

@@ -128,9 +128,11 @@ Result<FileBytes> draw_tile(std::string_view name, std::size_t max_bytes) {
 /// The PNG files of a folder, by name.
 class NodeFolder final : public PackFiles {
  public:
-  explicit NodeFolder(std::map<std::string, fs::path, std::less<>> files) : files_(std::move(files)) {}
+  NodeFolder(const fs::path& folder, std::map<std::string, fs::path, std::less<>> files)
+      : folder_(folder.string()), files_(std::move(files)) {}
 
   [[nodiscard]] bool has_tiles() const override { return true; }
+  [[nodiscard]] std::string identity() const override { return "folder " + folder_; }
 
   [[nodiscard]] Result<FileBytes> read(std::string_view path, std::size_t max_bytes) const override {
     constexpr std::string_view kAnimationEnd = ".mcmeta";
@@ -174,6 +176,7 @@ class NodeFolder final : public PackFiles {
     return FileBytes(std::vector<std::byte>(text.begin(), text.end()));
   }
 
+  std::string folder_;
   std::map<std::string, fs::path, std::less<>> files_;
 };
 
@@ -270,7 +273,7 @@ Result<std::shared_ptr<const PackFiles>> open_node_folder(const fs::path& folder
     std::string name = path.stem().string();
     files.insert_or_assign(std::move(name), std::move(path));
   }
-  return std::shared_ptr<const PackFiles>(std::make_shared<NodeFolder>(std::move(files)));
+  return std::shared_ptr<const PackFiles>(std::make_shared<NodeFolder>(folder, std::move(files)));
 }
 
 }  // namespace quoin::packs

@@ -36,6 +36,7 @@ class NodePack final : public PackFiles {
 
   [[nodiscard]] Result<std::optional<std::vector<std::byte>>> read(std::string_view path,
                                                                    std::size_t max_bytes) const override;
+  [[nodiscard]] std::string identity() const override { return draws_tiles_ ? "nodes" : "nodes without tiles"; }
   /// The tables of families and rules, by full node names.
   [[nodiscard]] static const BlockFamilies& families();
 

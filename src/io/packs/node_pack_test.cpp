@@ -29,7 +29,7 @@ using packs_test::plain_png;
 
 /// The type of a node with the look that the tables give it, or a folder.
 VoxelProperties shown_node(std::string_view node, const std::vector<fs::path>& folders = {}, bool has_own = true) {
-  const auto files = PackStack::open(folders);
+  const auto files = PackStack::open(folders, {});
   EXPECT_TRUE(files);
   BlockLooks looks(*files, has_own ? OwnPack::instance() : nullptr);
   const auto type = models::node_properties(node);
@@ -282,7 +282,7 @@ TEST(NodeFolder, FindsTilesByTheirNames) {
   EXPECT_EQ(node_face_colour(stairs, Direction::PosY), green);
   EXPECT_EQ(stairs.faces[Direction::PosY].texture.size(), 64);
   // Files outside of folders `textures` are no tiles, and a node whose tiles are missing keeps its colour.
-  BlockLooks looks(*PackStack::open(std::vector{game.path}));
+  BlockLooks looks(*PackStack::open(std::vector{game.path}, {}));
   const auto dirt = looks.applied(*models::node_properties("default:dirt"));
   EXPECT_TRUE(dirt.faces.empty());
   EXPECT_EQ(looks.report().missing_textures, 1U);
@@ -294,7 +294,7 @@ TEST(NodeFolder, FindsTilesByTheirNames) {
 TEST(NodeFolder, ReplacesLooksOfEarlierConversions) {
   const GameFolder game;
   game.put("textures/default_stone.png", plain_png({250, 10, 10}));
-  const auto files = PackStack::open(std::vector{game.path});
+  const auto files = PackStack::open(std::vector{game.path}, {});
   ASSERT_TRUE(files);
   BlockLooks with_folder(*files, OwnPack::instance());
   const VoxelProperties drawn = shown_node("default:stone");
@@ -336,7 +336,7 @@ TEST(NodeFolder, RefusesOtherFoldersAndDamagedImages) {
   other.put("textures/default_stone.png", "no image");
   other.put("textures/default_cobble.png", "");
   other.put("textures/default_wood.png", plain_png({1, 2, 3}).substr(0, 40));
-  const auto files = PackStack::open(std::vector{other.path});
+  const auto files = PackStack::open(std::vector{other.path}, {});
   ASSERT_TRUE(files);
   BlockLooks looks(*files);
   for (const char* name : {"default:stone", "default:cobble", "default:wood", "stairs:stair_wood"}) {
@@ -362,9 +362,10 @@ TEST(NodeTables, GiveEveryRuleModelsAndTiles) {
       names += part.get<std::string>() + " ";
     }
     for (const std::string& pattern : words(names)) {
-      PackName node = pack_name(replaced(pattern, "*", pattern.starts_with("*:") || pattern == "*" ? "x" : "x1"));
+      ResourceName node =
+          split_resource_name(replaced(pattern, "*", pattern.starts_with("*:") || pattern == "*" ? "x" : "x1"));
       if (pattern.find(':') == std::string::npos) node.space = "x";
-      const auto states = pack.read("assets/" + node.space + "/blockstates/" + node.name + ".json", kMaxJsonBytes);
+      const auto states = pack.read("assets/" + node.space + "/blockstates/" + node.path + ".json", kMaxJsonBytes);
       ASSERT_TRUE(states && *states) << pattern;
       const Json json = Json::parse(std::string(reinterpret_cast<const char*>((*states)->data()), (*states)->size()));
       std::set<std::string> used;
@@ -374,8 +375,8 @@ TEST(NodeTables, GiveEveryRuleModelsAndTiles) {
         for (const Json& part : json["multipart"]) used.insert(part["apply"]["model"].get<std::string>());
       }
       for (const std::string& name : used) {
-        const PackName model = pack_name(name);
-        const auto text = pack.read("assets/" + model.space + "/models/" + model.name + ".json", kMaxJsonBytes);
+        const ResourceName model = split_resource_name(name);
+        const auto text = pack.read("assets/" + model.space + "/models/" + model.path + ".json", kMaxJsonBytes);
         ASSERT_TRUE(text && *text) << name;
         ++models;
         const Json made = Json::parse(std::string(reinterpret_cast<const char*>((*text)->data()), (*text)->size()));
@@ -383,11 +384,11 @@ TEST(NodeTables, GiveEveryRuleModelsAndTiles) {
           for (const auto& [side, face] : element["faces"].items()) {
             const std::string variable = face["texture"].get<std::string>().substr(1);
             ASSERT_TRUE(made["textures"].contains(variable)) << name << " has no texture " << variable;
-            const PackName texture = pack_name(made["textures"][variable].get<std::string>());
+            const ResourceName texture = split_resource_name(made["textures"][variable].get<std::string>());
             const auto png =
-                pack.read("assets/" + texture.space + "/textures/" + texture.name + ".png", kMaxImageBytes);
-            ASSERT_TRUE(png) << texture.name;
-            EXPECT_TRUE(*png) << name << ": " << texture.name;
+                pack.read("assets/" + texture.space + "/textures/" + texture.path + ".png", kMaxImageBytes);
+            ASSERT_TRUE(png) << texture.path;
+            EXPECT_TRUE(*png) << name << ": " << texture.path;
           }
         }
       }

@@ -23,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 using FileBytes = std::optional<std::vector<std::byte>>;
 
-constexpr std::size_t kMaxZipBytes = std::size_t{2} << 30;
+constexpr std::uint64_t kMaxZipBytes = std::uint64_t{2} << 30;
 // Limits of a folder whose content is hashed.
 constexpr std::size_t kMaxEntries = std::size_t{1} << 20;
 constexpr std::uint64_t kMaxFolderBytes = kMaxZipBytes;
@@ -31,7 +31,19 @@ constexpr std::uint64_t kMaxFolderBytes = kMaxZipBytes;
 /// The sizes and CRC-32 of a pack's files below `assets`.
 using FileSums = std::map<std::string, ZipParts::Sum>;
 
-Error too_large(std::string_view path, std::uint64_t size, std::size_t most) {
+std::uint64_t with_text(std::uint64_t hash, std::string_view text) {
+  hash = mixed_with(hash, text.size());
+  for (const char c : text) hash = mixed_with(hash, static_cast<unsigned char>(c));
+  return hash;
+}
+
+std::uint64_t hash_of(const FileSums& sums) {
+  std::uint64_t hash = kHashSeed;
+  for (const auto& [name, sum] : sums) hash = mixed_with(mixed_with(with_text(hash, name), sum.size), sum.crc);
+  return hash;
+}
+
+Error too_large(std::string_view path, std::uint64_t size, std::uint64_t most) {
   return make_error(ErrorCode::LimitExceeded, printable(path) + " has " + std::to_string(size) + " bytes: at most " +
                                                   std::to_string(most) + " are read");
 }
@@ -49,6 +61,7 @@ std::string name_in_other_versions(std::string_view path) {
 
 class FolderPack final : public PackFiles {
  public:
+  /// Requires: an absolute path without links.
   explicit FolderPack(fs::path folder) : folder_(std::move(folder)) {}
 
   [[nodiscard]] Result<FileBytes> read(std::string_view path, std::size_t max_bytes) const override {
@@ -56,12 +69,18 @@ class FolderPack final : public PackFiles {
     const fs::path file = folder_ / fs::path(path);
     std::error_code error;
     if (!fs::is_regular_file(file, error)) return FileBytes();
+    const fs::path real = fs::canonical(file, error);
+    if (error || std::ranges::mismatch(folder_, real).in1 != folder_.end()) {
+      return make_error(ErrorCode::CannotRead, "a link to a file outside the folder of the pack", std::string(path));
+    }
     // One byte more shows a file that is too large, also if it grows.
     auto bytes = read_file_beginning(file, max_bytes + 1);
     if (!bytes) return bytes.error();
     if (bytes->size() > max_bytes) return too_large(path, fs::file_size(file, error), max_bytes);
     return FileBytes(std::move(*bytes));
   }
+
+  [[nodiscard]] std::string identity() const override { return "folder " + folder_.string(); }
 
  private:
   fs::path folder_;
@@ -103,6 +122,10 @@ class ZipPack final : public PackFiles {
     auto bytes = parts_.read(name, max_bytes);
     if (!bytes) return bytes.error();
     return FileBytes(std::move(*bytes));
+  }
+
+  [[nodiscard]] std::string identity() const override {
+    return "zip " + std::to_string(bytes_.size()) + " " + std::to_string(hash_of(sums()));
   }
 
  private:
@@ -149,9 +172,8 @@ Result<FileSums> sums_of_folder(const fs::path& folder) {
   std::size_t entries = 0;
   std::uint64_t bytes = 0;
   std::error_code error;
-  constexpr auto kOptions = fs::directory_options::follow_directory_symlink;
-  for (fs::recursive_directory_iterator at(has_assets ? folder / "assets" : folder, kOptions, error), end;
-       !error && at != end; at.increment(error)) {
+  for (fs::recursive_directory_iterator at(has_assets ? folder / "assets" : folder, error), end; !error && at != end;
+       at.increment(error)) {
     if (++entries > kMaxEntries) {
       return make_error(ErrorCode::LimitExceeded,
                         "the folder has more than " + std::to_string(kMaxEntries) + " files and folders",
@@ -190,13 +212,33 @@ bool is_pack_path(std::string_view path) {
   return true;
 }
 
+ResourceName split_resource_name(std::string_view text) {
+  const std::size_t colon = text.find(':');
+  if (colon == std::string_view::npos) return {"minecraft", std::string(text)};
+  return {colon == 0 ? "minecraft" : std::string(text.substr(0, colon)), std::string(text.substr(colon + 1))};
+}
+
+std::optional<ResourceName> resource_name(std::string_view text) {
+  ResourceName name = split_resource_name(text);
+  if (!is_pack_path(name.space) || name.space.find('/') != std::string::npos || !is_pack_path(name.path)) {
+    return std::nullopt;
+  }
+  return name;
+}
+
+std::string to_string(const ResourceName& name) {
+  return name.space + ":" + name.path;
+}
+
 Result<std::shared_ptr<const PackFiles>> open_pack(const fs::path& path) {
   std::error_code error;
   if (fs::is_directory(path, error)) {
-    if (fs::is_directory(path / "assets", error)) {
-      return std::shared_ptr<const PackFiles>(std::make_shared<FolderPack>(path));
+    if (!fs::is_directory(path / "assets", error)) {
+      return is_node_folder(path) ? open_node_folder(path) : no_assets(path);
     }
-    return is_node_folder(path) ? open_node_folder(path) : no_assets(path);
+    const fs::path folder = fs::canonical(path, error);
+    if (error) return make_error(ErrorCode::CannotRead, "cannot find the folder: " + error.message(), path.string());
+    return std::shared_ptr<const PackFiles>(std::make_shared<FolderPack>(folder));
   }
   auto pack = open_zip_pack(path);
   if (!pack) return pack.error();
@@ -204,6 +246,7 @@ Result<std::shared_ptr<const PackFiles>> open_pack(const fs::path& path) {
 }
 
 Result<std::shared_ptr<const PackFiles>> open_pack(std::vector<std::byte> zip) {
+  if (zip.size() > kMaxZipBytes) return too_large("the zip file", zip.size(), kMaxZipBytes);
   auto pack = ZipPack::open(std::move(zip));
   if (!pack) return pack.error();
   return std::shared_ptr<const PackFiles>(std::move(*pack));
@@ -221,13 +264,7 @@ Result<std::uint64_t> hash_of_files(const fs::path& path) {
     if (!pack) return pack.error();
     sums = (*pack)->sums();
   }
-  std::uint64_t hash = kHashSeed;
-  for (const auto& [name, sum] : sums) {
-    hash = mixed_with(hash, name.size());
-    for (const char c : name) hash = mixed_with(hash, static_cast<unsigned char>(c));
-    hash = mixed_with(mixed_with(hash, sum.size), sum.crc);
-  }
-  return hash;
+  return hash_of(sums);
 }
 
 void MemoryPack::put(std::string_view path, std::string content) {
@@ -243,6 +280,20 @@ Result<FileBytes> MemoryPack::read(std::string_view path, std::size_t max_bytes)
   std::vector<std::byte> bytes(content.size());
   if (!content.empty()) std::memcpy(bytes.data(), content.data(), content.size());
   return FileBytes(std::move(bytes));
+}
+
+std::string MemoryPack::identity() const {
+  std::uint64_t hash = files_.size();
+  for (const auto& [path, content] : files_) {
+    hash = with_text(with_text(hash, path), content);
+  }
+  return "memory " + std::to_string(hash);
+}
+
+std::string PackStack::identity() const {
+  std::string text;
+  for (const auto& pack : packs_) text += (text.empty() ? "" : "; ") + pack->identity();
+  return text;
 }
 
 Result<std::shared_ptr<const PackStack>> PackStack::open(std::span<const fs::path> paths,

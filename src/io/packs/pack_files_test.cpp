@@ -10,7 +10,11 @@
 
 #include <gtest/gtest.h>
 
+#include <quoin/io/block_packs.h>
+#include <quoin/io/file.h>
+
 #include "core/bytes/bytes.h"
+#include "io/packs/packs_for_tests.h"
 #include "io/zip.h"
 
 namespace quoin::packs {
@@ -108,6 +112,46 @@ TEST(PackFiles, RefusesNamesThatLeaveThePack) {
   EXPECT_EQ(text_in(**zip, "assets/a"), "inside");
 }
 
+TEST(PackFiles, RefusesLinksOutOfTheFolder) {
+  const fs::path folder = fresh_folder("links");
+  fs::create_directories(folder / "pack/assets/real");
+  fs::create_directories(folder / "outside");
+  write_text(folder / "secret.json", "secret");
+  write_text(folder / "outside/a.json", "secret");
+  write_text(folder / "pack/assets/real/a.json", "inside");
+  std::error_code error;
+  fs::create_symlink(folder / "secret.json", folder / "pack/assets/file.json", error);
+  if (error) GTEST_SKIP() << "the file system has no links";
+  fs::create_directory_symlink(folder / "outside", folder / "pack/assets/folder");
+  fs::create_directory_symlink("real", folder / "pack/assets/alias");
+  fs::create_directory_symlink(folder / "pack", folder / "link");
+  for (const char* name : {"pack", "link"}) {
+    const auto pack = open_pack(folder / name);
+    ASSERT_TRUE(pack);
+    for (const std::string path : {"assets/file.json", "assets/folder/a.json"}) {
+      EXPECT_TRUE(text_in(**pack, path).find("a link to a file outside the folder") != std::string::npos)
+          << text_in(**pack, path);
+    }
+    EXPECT_EQ(text_in(**pack, "assets/alias/a.json"), "inside") << "a link within the folder";
+  }
+}
+
+TEST(PackFiles, IdentitiesDifferByContent) {
+  const auto identity_of = [](const std::string& content) {
+    return (*open_pack(zip_of({{"assets/a", content}})))->identity();
+  };
+  EXPECT_EQ(identity_of("a"), identity_of("a"));
+  EXPECT_NE(identity_of("a"), identity_of("b"));
+  const auto a = *open_pack(zip_of({{"assets/a", "a"}}));
+  const auto b = *open_pack(zip_of({{"assets/a", "b"}}));
+  EXPECT_NE(PackStack({a, b}).identity(), PackStack({b, a}).identity());
+  MemoryPack memory;
+  memory.put("assets/a", "1");
+  const std::string before = memory.identity();
+  memory.put("assets/a", "2");
+  EXPECT_NE(memory.identity(), before);
+}
+
 TEST(PackFiles, RejectsOtherFilesAndFolders) {
   EXPECT_NE(error_of_zip({}).find("nor a zip file"), std::string::npos);
   EXPECT_NE(error_of_zip({std::byte{'P'}, std::byte{'K'}, std::byte{3}}).find("cut off"), std::string::npos);
@@ -184,6 +228,67 @@ TEST(PackFiles, ReadsZip64) {
   EXPECT_EQ(text_in(**pack, "assets/a"), "inside");
   large[large.size() - 22 - 20] ^= std::byte{1};  // no locator: the directory's fields are out of range
   EXPECT_FALSE(open_pack(large));
+}
+
+// A pack like the one of the benchmark packs/stack.
+class BlockPackStack : public testing::Test {
+ protected:
+  static constexpr int kTypes = 24;
+
+  static std::shared_ptr<BlockPacks> opened() {
+    static const std::vector<std::byte> zip =
+        packs_test::pack_stack({.textures = 40, .texture_size = 128, .models = 30});
+    return *BlockPacks::open(std::vector<std::vector<std::byte>>{zip});
+  }
+};
+
+TEST_F(BlockPackStack, LooksAreTheSameForAnyNumberOfThreads) {
+  const VoxelRegistry plain = packs_test::stack_types(kTypes);
+  const auto one_by_one = opened();
+  for (const unsigned threads : {1U, 3U, 8U}) {
+    VoxelRegistry types = plain;
+    const auto packs = opened();
+    packs->apply(types, {threads});
+    EXPECT_EQ(to_string(packs->report()), "");
+    EXPECT_EQ(packs->report().types, static_cast<std::size_t>(kTypes));
+    for (std::size_t i = 1; i < types.size(); ++i) {
+      const VoxelProperties& type = types[static_cast<VoxelType>(i)];
+      EXPECT_EQ(type.shapes.empty(), (i - 1) % 3 == 0) << type.name;
+      VoxelProperties wanted = one_by_one->applied(plain[static_cast<VoxelType>(i)]);
+      wanted.colour = type.colour;  // of a registry
+      EXPECT_EQ(type, wanted) << type.name;
+    }
+  }
+}
+
+TEST_F(BlockPackStack, TexelsStayCompressedUntilTheyAreRead) {
+  VoxelRegistry types = packs_test::stack_types(kTypes);
+  opened()->apply(types);
+  TextureSet textures;
+  textures.add(types);
+  ASSERT_EQ(textures.arrays().size(), 1U);
+  const std::vector<Texture>& all = textures.arrays()[0].layers;
+  EXPECT_EQ(all.size(), 32U) << "24, and a top for each pair of 16 models";
+  for (const Texture& texture : all) EXPECT_FALSE(texture.has_texels()) << texture.name();
+  decode_textures(types, {2});
+  for (const Texture& texture : all) {
+    ASSERT_TRUE(texture.has_texels());
+    const int number = std::stoi(texture.name().substr(std::string("pack:block/t").size()));
+    const auto wanted =
+        Texture::from_image(texture.name(), packs_test::noise_image(128, static_cast<std::uint32_t>(number) % 16));
+    EXPECT_EQ(texture, *wanted);
+  }
+}
+
+TEST(BlockPackInputs, CorpusMakesValidTypes) {
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(QUOIN_SOURCE_DIR "/tests/corpus/packs")) {
+    const auto bytes = read_file(entry.path());
+    ASSERT_TRUE(bytes);
+    EXPECT_TRUE(packs_test::reads_any_pack(*bytes)) << entry.path();
+    ++files;
+  }
+  EXPECT_GE(files, 4U);
 }
 
 }  // namespace

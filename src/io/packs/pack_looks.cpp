@@ -11,6 +11,7 @@
 
 #include <nlohmann/json.hpp>
 #include <quoin/core/assert.h>
+#include <quoin/io/image_files.h>
 
 #include "core/bytes/text.h"
 #include "io/luanti/luanti.h"
@@ -37,26 +38,39 @@ bool has_any(std::string_view name, std::initializer_list<std::string_view> word
   return std::ranges::any_of(words, [&](std::string_view word) { return name.find(word) != std::string_view::npos; });
 }
 
-/// Returns the colour of tinted faces that does not depend on the state.
+/// A colour of tinted faces that does not depend on the state, and the biome colour that it is.
+struct NamedTint {
+  std::uint32_t rgb = 0xFFFFFF;
+  minecraft::Tint kind = minecraft::Tint::None;
+};
+
 /// Source: the Minecraft Wiki, "Block colors" and "Color" (https://minecraft.wiki/w/Block_colors).
-Rgba8 tint_of(const VoxelProperties& type, std::string_view name) {
-  if (const auto found = type.attributes.find(minecraft::kTintColourAttribute); found != type.attributes.end()) {
-    std::uint32_t rgb = 0;
-    const std::string& digits = found->second;
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), rgb, 16);
-    if (error == std::errc() && end == digits.data() + digits.size()) return minecraft::colour_of_rgb(rgb);
-  }
+NamedTint tint_of(const VoxelProperties& type, std::string_view name) {
+  using minecraft::Tint;
   constexpr minecraft::BiomeTints kPlains{};
-  if (name == "spruce_leaves") return minecraft::colour_of_rgb(0x619961);
-  if (name == "birch_leaves") return minecraft::colour_of_rgb(0x80A755);
-  if (name == "lily_pad") return minecraft::colour_of_rgb(0x208030);
-  if (name.starts_with("attached_") && name.ends_with("_stem")) return minecraft::colour_of_rgb(0xE0C71C);
-  if (has_any(name, {"water", "bubble_column"})) return minecraft::colour_of_rgb(kPlains.water);
-  if (has_any(name, {"leaves", "vine"})) return minecraft::colour_of_rgb(kPlains.foliage);
-  if (has_any(name, {"grass", "fern", "sugar_cane", "petals", "wildflowers", "bush"})) {
-    return minecraft::colour_of_rgb(kPlains.grass);
+  NamedTint tint;
+  if (name == "spruce_leaves") {
+    tint = {0x619961};
+  } else if (name == "birch_leaves") {
+    tint = {0x80A755};
+  } else if (name == "lily_pad") {
+    tint = {0x208030};
+  } else if (name.starts_with("attached_") && name.ends_with("_stem")) {
+    tint = {0xE0C71C};
+  } else if (has_any(name, {"water", "bubble_column"})) {
+    tint = {kPlains.water, Tint::Water};
+  } else if (has_any(name, {"leaves", "vine"})) {
+    tint = {kPlains.foliage, Tint::Foliage};
+  } else if (has_any(name, {"grass", "fern", "sugar_cane", "petals", "wildflowers", "bush"})) {
+    tint = {kPlains.grass, Tint::Grass};
   }
-  return kWhite;
+  if (const auto found = type.attributes.find(minecraft::kTintColourAttribute); found != type.attributes.end()) {
+    const std::string& digits = found->second;
+    std::uint32_t rgb = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), rgb, 16);
+    if (error == std::errc() && end == digits.data() + digits.size()) tint.rgb = rgb;
+  }
+  return tint;
 }
 
 /// A tint by a number in the state: the power of wires, the age of stems. Near powers have one colour, since a type has
@@ -161,29 +175,83 @@ class BlockLooks::Maker {
     const auto found = library_.states_of(states_.block());
     if (!found) return found.error();
     if (*found == nullptr) return std::optional<VoxelProperties>();
-    if (!(*found)->is_multipart) states_.choose_absent(**found);
-    if (auto done = find_outcomes(**found); !done) return done.error();
-    // The game draws models without elements by code.
-    std::erase_if(outcomes_, [](const Outcome& each) { return each.model->elements.empty(); });
+    const BlockStates& states = **found;
+    if (!states.is_multipart) states_.choose_absent(states);
+    if (auto done = find_outcomes(states, Choices::Heaviest); !done) return done.error();
     if (outcomes_.empty()) return std::optional<VoxelProperties>();
     if (!node_.fluid.empty()) return make_node_fluid();
     const auto is_textured = [&](const Outcome& outcome) {
-      return std::ranges::any_of(outcome.model->elements, [&](const PackElement& element) {
+      return std::ranges::any_of(outcome.model->elements(), [&](const PackElement& element) {
         return std::ranges::any_of(
             element.faces, [&](const auto& face) { return face && texture_of_face(*outcome.model, *face) != nullptr; });
       });
     };
     has_textures_ = std::ranges::any_of(outcomes_, is_textured);
-    is_multipart_ = (*found)->is_multipart;
+    is_multipart_ = states.is_multipart;
     if (!is_multipart_) {
       if (auto cube = make_cube()) return std::optional(std::move(*cube));
+    }
+    if (std::ranges::any_of(states.cases, [](const StateCase& each) { return each.models.size() > 1; })) {
+      if (auto chosen = make_choices(states)) return chosen;
     }
     auto shaped = make_shapes();
     if (!shaped) return shaped.error();
     return std::optional(std::move(*shaped));
   }
 
+  /// Appends the names of the textures that `make` needs, apart from those of lighter models. Returns true if the
+  /// library has a look for the type.
+  bool list_textures(std::vector<ResourceName>& names) {
+    is_quiet_ = true;
+    if (is_fluid() && !keeps_fluid()) {
+      for (const char* const end : {"_still", "_flow"}) names.push_back({"minecraft", fluid_texture(end)});
+      return true;
+    }
+    const auto found = library_.states_of(states_.block());
+    if (!found || *found == nullptr) return false;
+    if (!(*found)->is_multipart) states_.choose_absent(**found);
+    if (!find_outcomes(**found, Choices::Heaviest)) return false;
+    for (const Outcome& outcome : outcomes_) {
+      for (const PackElement& element : outcome.model->elements()) {
+        for (const auto& face : element.faces) {
+          auto name = face ? outcome.model->texture(face->texture) : std::nullopt;
+          if (name) names.push_back(std::move(*name));
+        }
+      }
+    }
+    return !outcomes_.empty();
+  }
+
  private:
+  enum class Choices : std::uint8_t { Heaviest, ByPosition };
+
+  /// Returns the type with shapes that choose among models by position; nullopt, noted, if it has too many parts.
+  std::optional<VoxelProperties> make_choices(const BlockStates& states) {
+    const std::vector<Outcome> heaviest = outcomes_;
+    outcomes_.clear();
+    std::string reason = "no model of its choices can be used";
+    if (const Status found = find_outcomes(states, Choices::ByPosition); !found) {
+      reason = found.error().message;
+    } else if (!outcomes_.empty()) {
+      auto shaped = make_shapes();
+      const Status valid = shaped ? validate_type(*shaped) : Status(shaped.error());
+      if (valid) return std::move(*shaped);
+      reason = valid.error().message;
+    }
+    outcomes_ = heaviest;
+    if (!is_own_) {
+      ++looks_.report_.without_choices;
+      looks_.note(type_.name, reason + "; its heaviest model is shown everywhere");
+    }
+    return std::nullopt;
+  }
+
+  /// Returns the tint of faces by the packs' colour maps.
+  [[nodiscard]] Rgba8 tint() const {
+    const NamedTint named = tint_of(type_, name_);
+    return minecraft::colour_of_rgb(looks_.tint_by_maps(named.kind, named.rgb));
+  }
+
   [[nodiscard]] bool is_fluid() const {
     if (name_ != "water" && name_ != "lava" && name_ != "bubble_column") return false;
     const minecraft::StateField* const level = states_.field("level");
@@ -208,8 +276,8 @@ class BlockLooks::Maker {
     const PackTexture* const still = read("_still");
     if (still == nullptr) return std::nullopt;
     const PackTexture* const flow = read("_flow");
-    const Rgba8 tint = name_ == "lava" ? kWhite : tint_of(type_, name_);
-    const VoxelFace top{.texture = still->texture, .turn = 3, .tint = tint, .alpha = still->alpha};
+    const Rgba8 colour = name_ == "lava" ? kWhite : tint();
+    const VoxelFace top{.texture = still->texture, .turn = 3, .tint = colour, .alpha = still->alpha};
     VoxelFace side = top;
     side.turn = 0;
     if (flow != nullptr) {
@@ -255,47 +323,80 @@ class BlockLooks::Maker {
     return std::optional(std::move(made));
   }
 
-  /// Fills `outcomes_`: models without cases that cannot hold, equal ones once.
-  Status find_outcomes(const BlockStates& states) {
-    const StateTint* const by_state = state_tint_of(name_);
-    const Rgba8 tint = tint_of(type_, name_);
-    const bool has_others = states.cases.size() > 1;
+  /// Fills `outcomes_`: models with elements, without cases that cannot hold, equal ones once. The game draws models
+  /// without elements by code.
+  Status find_outcomes(const BlockStates& states, Choices choices) {
+    const Rgba8 colour = tint();
     std::size_t condition_count = 0;
+    std::vector<ShapeCondition> taken;  // by earlier variants
     for (const StateCase& each : states.cases) {
       auto when = states_.conditions(each);
       if (!when) return when.error();
+      if (!states.is_multipart && !when->empty()) {
+        auto left = conditions_without(*when, taken);
+        if (!left) return left.error();
+        taken.insert(taken.end(), when->begin(), when->end());
+        when = std::move(left);
+      }
       condition_count += when->size();
       if (condition_count > kMaxTypeConditions) {
         return make_error(ErrorCode::LimitExceeded,
                           "more than " + std::to_string(kMaxTypeConditions) + " conditions of a block");
       }
       if (when->empty()) continue;
-      // A variant without properties stands for all states that have no other.
-      if (!states.is_multipart && has_others && is_always(*when) && !outcomes_.empty()) continue;
-      const auto model = library_.models.model(each.models.front().model);
-      if (!model || *model == nullptr) {
-        note_model(each.models.front().model, model ? std::string("no such model") : to_string(model.error()));
-        continue;
+      if (choices == Choices::Heaviest || each.models.size() == 1) {
+        add_model(each.heaviest(), colour, std::move(*when));
+      } else if (auto done = add_choices(each, colour, *when); !done) {
+        return done;
       }
-      const minecraft::StateField* const field = by_state == nullptr ? nullptr : states_.field(by_state->property);
-      if (field == nullptr || !has_tinted_face(**model)) {
-        add_outcome(each.models.front(), tint, std::move(*when), *model);
-      } else {
-        add_by_state(*by_state, *field, each.models.front(), *when, *model);
-      }
+    }
+    std::erase_if(outcomes_, [](const Outcome& each) { return each.model->elements().empty(); });
+    return {};
+  }
+
+  /// Adds the models of a case, each with its share of positions.
+  Status add_choices(const StateCase& each, Rgba8 colour, const std::vector<ShapeCondition>& when) {
+    std::int64_t total = 0;
+    for (const StateModel& model : each.models) total += model.weight;
+    if (total > kMaxPositionCount) {
+      return make_error(ErrorCode::LimitExceeded,
+                        "the weights of its models have a sum above " + std::to_string(kMaxPositionCount));
+    }
+    std::uint16_t first = 0;
+    for (const StateModel& model : each.models) {
+      const auto end = static_cast<std::uint16_t>(first + model.weight);
+      std::vector<ShapeCondition> share = when;
+      for (ShapeCondition& condition : share) condition.positions = {static_cast<std::uint16_t>(total), first, end};
+      add_model(model, colour, std::move(share));
+      first = end;
     }
     return {};
   }
 
+  void add_model(const StateModel& state, Rgba8 colour, std::vector<ShapeCondition> when) {
+    const auto model = library_.models.model(state.model);
+    if (!model || *model == nullptr) {
+      note_model(state.model, model ? std::string("no such model") : to_string(model.error()));
+      return;
+    }
+    const StateTint* const by_state = state_tint_of(name_);
+    const minecraft::StateField* const field = by_state == nullptr ? nullptr : states_.field(by_state->property);
+    if (field == nullptr || !has_tinted_face(**model)) {
+      add_outcome(state, colour, std::move(when), *model);
+    } else {
+      add_by_state(*by_state, *field, state, when, *model);
+    }
+  }
+
   /// Counts a model that cannot be used, once.
   void note_model(const std::string& name, const std::string& reason) {
-    if (is_own_ || !looks_.missing_.insert("model " + name).second) return;
+    if (is_quiet_ || is_own_ || !looks_.missing_.insert("model " + name).second) return;
     ++looks_.report_.missing_models;
     looks_.note("model " + name, reason);
   }
 
   static bool has_tinted_face(const BlockModel& model) {
-    return std::ranges::any_of(model.elements, [](const PackElement& element) {
+    return std::ranges::any_of(model.elements(), [](const PackElement& element) {
       return std::ranges::any_of(element.faces, [](const auto& face) { return face && face->is_tinted; });
     });
   }
@@ -353,10 +454,10 @@ class BlockLooks::Maker {
     const FaceColours colours{texture, {type_.colour.r, type_.colour.g, type_.colour.b}, outcome.tint};
     const AxisOrientation turn = orientation_of(outcome.state);
     if (!outcome.state.keeps_uv || turn == AxisOrientation()) {
-      return elements_of(*outcome.model, outcome.model->elements, colours, has_textures_, looks_.textures_);
+      return elements_of(*outcome.model, outcome.model->elements(), colours, has_textures_, looks_.textures_);
     }
     std::vector<PackElement> turned;
-    for (const PackElement& each : outcome.model->elements) turned.push_back(turned_with_world(each, turn));
+    for (const PackElement& each : outcome.model->elements()) turned.push_back(turned_with_world(each, turn));
     return elements_of(*outcome.model, turned, colours, has_textures_, looks_.textures_);
   }
 
@@ -365,10 +466,16 @@ class BlockLooks::Maker {
     return outcome.state.keeps_uv ? AxisOrientation() : orientation_of(outcome.state);
   }
 
+  [[nodiscard]] static bool follows_positions(const Outcome& outcome) {
+    return std::ranges::any_of(outcome.when,
+                               [](const ShapeCondition& each) { return !(each.positions == PositionShare{}); });
+  }
+
   /// Returns true if all outcomes are one model, turned by the state.
   [[nodiscard]] bool is_one_model() const {
     const Outcome& first = outcomes_.front();
     return std::ranges::all_of(outcomes_, [&](const Outcome& each) {
+      if (follows_positions(each)) return false;
       const bool is_locked = each.state.keeps_uv && orientation_of(each.state) != AxisOrientation();
       return each.model == first.model && each.tint == first.tint && (!is_locked || outcomes_.size() == 1);
     });
@@ -386,9 +493,9 @@ class BlockLooks::Maker {
     std::uint32_t mask = 0;
     for (const Outcome& outcome : outcomes_) {
       for (const ShapeCondition& condition : outcome.when) {
-        if (condition.state_mask == 0 || !condition.connected.empty() || !condition.unconnected.empty()) {
-          return std::nullopt;
-        }
+        const bool follows_others =
+            !condition.connected.empty() || !condition.unconnected.empty() || condition.corner.has_value();
+        if (condition.state_mask == 0 || follows_others) return std::nullopt;
         mask |= condition.state_mask;
       }
     }
@@ -607,6 +714,7 @@ class BlockLooks::Maker {
   BlockFamilies::Traits node_;
   std::string_view name_;
   bool is_own_ = false;
+  bool is_quiet_ = false;  // nothing is noted
   bool is_multipart_ = false;
   bool has_textures_ = false;
   std::vector<Outcome> outcomes_;
@@ -620,6 +728,12 @@ std::shared_ptr<const PackFiles> stacked(std::vector<std::shared_ptr<const PackF
   return packs.size() == 1 ? packs.front() : std::make_shared<PackStack>(std::move(packs));
 }
 
+/// Returns true for Minecraft blocks and Luanti nodes.
+bool has_look(const VoxelProperties& type) {
+  return type.attributes.contains(minecraft::kStatesAttribute) ||
+         type.attributes.contains(models::kNodeStatesAttribute);
+}
+
 /// Returns the fields of a node's param2 that families name. They overlap: the family of a node uses one of them.
 std::vector<minecraft::StateField> param2_fields() {
   return {{"wallmounted", 'n', 0, 3}, {"style", 'n', 0, 3}, {"facedir", 'n', 0, 5}};
@@ -629,23 +743,23 @@ std::vector<minecraft::StateField> param2_fields() {
 
 std::vector<BlockLooks::Source> BlockLooks::sources_of_node(const VoxelProperties& type) {
   std::vector<Source> sources;
-  const PackName name = pack_name(type.name);
+  const ResourceName name = split_resource_name(type.name);
   const BlockFamilies::Traits traits = NodePack::families().traits(name);
   const TypeStates states(type.name, param2_fields(), traits.groups != 0);
-  const std::string tile = name.space + "_" + name.name;
+  const std::string tile = name.space + "_" + name.path;
   const auto has_tile = [&](const char* end) {
     const auto found = packs_->read(tile_path(tile + end), kMaxImageBytes);
     return found && *found;
   };
   sources.push_back({&library_, states, traits, true});
   // A node that only the rule for all names knows, and whose texture no folder has, may have the name of a block.
-  const bool is_block = traits.is_fallback && own_library_ && !name.name.empty() &&
-                        OwnPack::instance()->families().is_known({"minecraft", name.name}) &&
+  const bool is_block = traits.is_fallback && own_library_ && !name.path.empty() &&
+                        OwnPack::instance()->families().is_known({"minecraft", name.path}) &&
                         !(packs_->has_tiles() && (has_tile("") || has_tile("_top") || has_tile("_side")));
   if (is_block) {
     BlockFamilies::Traits guessed;
     guessed.is_fallback = true;
-    sources.push_back({&*own_library_, TypeStates("minecraft:" + name.name, {}, false), guessed, false});
+    sources.push_back({&*own_library_, TypeStates("minecraft:" + name.path, {}, false), guessed, false});
   }
   if (node_library_) sources.push_back({&*node_library_, states, traits, packs_->has_tiles()});
   return sources;
@@ -676,11 +790,69 @@ void BlockLooks::note(std::string name, const std::string& reason) {
     report_.names.push_back(printable(name.append(" (").append(reason).append(")")));
 }
 
-VoxelProperties BlockLooks::applied(const VoxelProperties& type) {
-  if (!type.attributes.contains(minecraft::kStatesAttribute) &&
-      !type.attributes.contains(models::kNodeStatesAttribute)) {
-    return type;
+void BlockLooks::prepare(const VoxelRegistry& types, std::size_t first, Threads threads) {
+  std::vector<ResourceName> names;
+  {
+    const std::scoped_lock lock(mutex_);
+    std::set<std::string> listed;
+    for (std::size_t i = first; i < types.size(); ++i) {
+      const VoxelProperties& type = types[static_cast<VoxelType>(i)];
+      if (!has_look(type)) continue;
+      std::vector<ResourceName> of_type;
+      for (Source& source : sources_of(type)) {
+        const bool keeps_look = !source.is_named && (!type.faces.empty() || !type.shapes.empty());
+        if (keeps_look || Maker(*this, std::move(source), type).list_textures(of_type)) break;
+      }
+      for (ResourceName& name : of_type) {
+        if (!textures_.knows(name) && listed.insert(to_string(name)).second) names.push_back(std::move(name));
+      }
+    }
   }
+  // Without the lock: a thread that waits for the others may meanwhile be asked for looks.
+  std::vector<std::optional<TextureReader::Known>> read(names.size());
+  parallel_for(names.size(), threads, [&](std::size_t i) { read[i].emplace(textures_.read(names[i])); });
+  const std::scoped_lock lock(mutex_);
+  for (std::size_t i = 0; i < names.size(); ++i) textures_.put(names[i], std::move(*read[i]));
+}
+
+std::optional<std::uint32_t> BlockLooks::colour_in(ColourMap& map, const char* name,
+                                                   const minecraft::Climate& climate) {
+  constexpr int kSize = 256;
+  if (!map.is_read) {
+    map.is_read = true;
+    const std::string path = std::string("assets/minecraft/textures/colormap/") + name + ".png";
+    const auto png = packs_->read(path, kMaxImageBytes);
+    auto image = png && *png ? read_alpha_image(**png) : Result<AlphaImage>(AlphaImage{});
+    const bool is_map = image && image->width == kSize && image->height == kSize;
+    if (is_map) {
+      map.image = std::move(*image);
+    } else if (!png || *png) {
+      const Error* const error = !png ? &png.error() : !image ? &image.error() : nullptr;
+      ++report_.missing_textures;
+      note(path, error != nullptr ? to_string(*error) : "a colour map has 256 x 256 pixels");
+    }
+  }
+  if (!map.image) return std::nullopt;
+  const auto pixel = [](float share) { return static_cast<std::size_t>((1.0F - share) * 255.0F); };
+  const std::size_t column = pixel(climate.temperature);
+  const std::size_t row = pixel(climate.downfall * climate.temperature);
+  const std::uint8_t* const rgba = &map.image->rgba[4 * (row * kSize + column)];
+  return std::uint32_t{rgba[0]} << 16 | std::uint32_t{rgba[1]} << 8 | rgba[2];
+}
+
+/// Returns the colour that the packs' colour maps have in place of one of the game's own.
+std::uint32_t BlockLooks::tint_by_maps(minecraft::Tint tint, std::uint32_t rgb) {
+  const bool is_grass = tint == minecraft::Tint::Grass;
+  if (!is_grass && tint != minecraft::Tint::Foliage) return rgb;
+  const auto climate = is_grass ? minecraft::climate_of_grass(rgb) : minecraft::climate_of_foliage(rgb);
+  if (!climate) return rgb;
+  const auto found = colour_in(is_grass ? grass_ : foliage_, is_grass ? "grass" : "foliage", *climate);
+  if (!found) return rgb;
+  return climate->is_dark && is_grass ? ((*found & 0xFEFEFE) + 0x28340A) >> 1 : *found;
+}
+
+VoxelProperties BlockLooks::applied(const VoxelProperties& type) {
+  if (!has_look(type)) return type;
   const std::scoped_lock lock(mutex_);
   ++report_.types;
   std::string reason = "not in the packs";

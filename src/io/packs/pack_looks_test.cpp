@@ -2,13 +2,18 @@
 #include "io/packs/pack_own.h"
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <quoin/core/image.h>
+#include <quoin/io/image_files.h>
 
 #include "io/minecraft/minecraft.h"
 #include "io/minecraft/minecraft_for_tests.h"
@@ -489,10 +494,14 @@ TEST(PackShapes, PartsOfTexturesTurnWithTheWorld) {
   EXPECT_EQ(turned.faces[2]->turn, 0);
 }
 
+std::vector<std::byte> bytes_of(std::string_view text) {
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
 TEST(PackTextures, TakesTheFirstFrame) {
   const auto two = [](int, int y) { return y < 16 ? kRed : kGreen; };
-  const std::string image = packs_test::png(16, two, 2);
-  const auto bytes = std::as_bytes(std::span(image));
+  const std::vector<std::byte> bytes = bytes_of(packs_test::png(16, two, 2));
   const auto first = texture_of_png("a", bytes, R"({"animation": {}})");
   ASSERT_TRUE(first);
   EXPECT_EQ(first->texture.level(0)[0], kRed);
@@ -509,15 +518,57 @@ TEST(PackTextures, TakesTheFirstFrame) {
   }
 }
 
+TEST(PackTextures, SquareImagesHaveFramesToo) {
+  PackBuilder pack = small_pack();
+  const auto quarter = [](int x, int y) { return x < 16 && y < 16 ? kRed : kGreen; };
+  pack.texture("block/sheet", packs_test::png(32, quarter));
+  const auto files = pack.files();
+  EXPECT_EQ((*TextureReader(*files).texture({"minecraft", "block/sheet"}))->texture.size(), 32);
+  pack.put("textures/block/sheet.png.mcmeta", R"({"animation": {"width": 16, "height": 16}} // four frames)");
+  const PackTexture first = **TextureReader(*files).texture({"minecraft", "block/sheet"});
+  EXPECT_EQ(first.texture.size(), 16);
+  EXPECT_EQ(first.texture.mean(), linear_colour(kRed));
+  pack.put("textures/block/sheet.png.mcmeta", R"({"animation": {}})");
+  EXPECT_EQ((*TextureReader(*files).texture({"minecraft", "block/sheet"}))->texture.size(), 32);
+}
+
+TEST(PackTextures, LongImagesAreSampledInTheirWholeHeight) {
+  constexpr int kHeight = 1 << 19;
+  AlphaImage image{1, kHeight, {}};
+  image.rgba.assign(std::size_t{4} * kHeight, 255);
+  for (std::size_t row = kHeight / 2; row < kHeight; ++row) image.rgba[4 * row] = 0;
+  const auto png = write_png(image);
+  ASSERT_TRUE(png);
+  const auto made = texture_of_png("a", *png);
+  ASSERT_TRUE(made) << made.error().message;
+  ASSERT_EQ(made->texture.size(), 1'024);
+  EXPECT_EQ(made->texture.level(0)[511 * 1'024].r, 255);
+  EXPECT_EQ(made->texture.level(0)[512 * 1'024].r, 0);
+  EXPECT_EQ(made->texture.level(0)[1'023 * 1'024].r, 0);
+}
+
+TEST(PackTextures, LargeTexturesKeepTheirImageUntilTheyAreRead) {
+  const std::string large = packs_test::png(128, [](int x, int y) {
+    return Rgba8{static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(y), 7, static_cast<std::uint8_t>(x * y % 3)};
+  });
+  const auto made = texture_of_png("a", bytes_of(large));
+  ASSERT_TRUE(made);
+  EXPECT_FALSE(made->texture.has_texels());
+  EXPECT_EQ(made->alpha, FaceAlpha::Cutout) << "nearly clear everywhere";
+  EXPECT_EQ(made->texture.level(0)[128 * 5 + 9], (Rgba8{9, 5, 7, 0})) << "as exact as when it was measured";
+  EXPECT_TRUE(made->texture.has_texels());
+  EXPECT_TRUE(texture_of_png("a", bytes_of(packs_test::plain_png(kRed)))->texture.has_texels()) << "a small one";
+}
+
 TEST(PackTextures, AcceptsOtherSizesAndRejectsOtherFiles) {
   const std::string small = packs_test::plain_png(kRed, 8);
-  EXPECT_EQ(texture_of_png("a", std::as_bytes(std::span(small)))->texture.size(), 16);
+  EXPECT_EQ(texture_of_png("a", bytes_of(small))->texture.size(), 16);
   const std::string odd = packs_test::plain_png(kRed, 48);
-  EXPECT_EQ(texture_of_png("a", std::as_bytes(std::span(odd)))->texture.size(), 64);
+  EXPECT_EQ(texture_of_png("a", bytes_of(odd))->texture.size(), 64);
   EXPECT_FALSE(texture_of_png("a", {}));
-  EXPECT_FALSE(texture_of_png("a", std::as_bytes(std::span(small)).first(40)));
+  EXPECT_FALSE(texture_of_png("a", bytes_of(small.substr(0, 40))));
   const std::string nearly = packs_test::plain_png({1, 2, 3, 252});
-  EXPECT_EQ(texture_of_png("a", std::as_bytes(std::span(nearly)))->alpha, FaceAlpha::Opaque);
+  EXPECT_EQ(texture_of_png("a", bytes_of(nearly))->alpha, FaceAlpha::Opaque);
 }
 
 // Returns a zip file with the looks of stone and of stairs in all states.
@@ -621,6 +672,134 @@ TEST(PackLooks, BlendedTexturesAreLimited) {
   EXPECT_NE(textures.blended(a, &b).look, a.look) << "made once";
   EXPECT_EQ(textures.blended(b, &a).look, b.look);
   EXPECT_EQ(textures.refused_blends(), 1U);
+}
+
+// Returns a model with one box of a height.
+std::string box_of_height(int height) {
+  return R"({"elements": [{"from": [0, 0, 0], "to": [16, )" + std::to_string(height) +
+         R"(, 16], "faces": {"up": {"texture": "block/red"}}}]})";
+}
+
+float height_at(const VoxelProperties& type, std::uint32_t state, IVec3 at) {
+  const auto position = static_cast<std::uint16_t>(position_number(at) % type.shapes.position_count());
+  return type.shapes.model(state, type.orientations.of(state), {.position = position}).max.y * 16.0F;
+}
+
+TEST(PackChoices, ModelsAreChosenByPositionAndWeight) {
+  PackBuilder pack = small_pack();
+  for (const int height : {1, 2, 3}) pack.model("block/h" + std::to_string(height), box_of_height(height));
+  pack.states("dead_bush", R"({"variants": {"": [{"model": "block/h1"}, {"model": "block/h2", "weight": 2},
+    {"model": "block/h3", "y": 90}]}})");
+  const TypeAndState bush = block("minecraft:dead_bush");
+  const VoxelProperties made = look(pack, bush.type);
+  ASSERT_FALSE(made.shapes.empty());
+  EXPECT_EQ(made.shapes.position_count(), 4U);
+  for (int i = 0; i < 500; ++i) {
+    const IVec3 at{i * 7 - 1'000, i % 19, 3 - i * 13};
+    const std::uint32_t chance = position_number(at) % 4;
+    EXPECT_EQ(height_at(made, bush.state, at), chance == 0 ? 1.0F : chance < 3 ? 2.0F : 3.0F);
+  }
+  // The same without weights: one model everywhere.
+  pack.states("dead_bush", R"({"variants": {"": {"model": "block/h1"}}})");
+  EXPECT_EQ(look(pack, bush.type).shapes.position_count(), 1U);
+}
+
+TEST(PackChoices, StatesHaveTheirOwnChoices) {
+  PackBuilder pack = small_pack();
+  for (const int height : {1, 2, 3, 4}) pack.model("block/h" + std::to_string(height), box_of_height(height));
+  pack.states("snow", R"({"variants": {"layers=1": [{"model": "block/h1"}, {"model": "block/h2"}],
+    "layers=2": [{"model": "block/h3", "weight": 2}, {"model": "block/h4"}], "": {"model": "block/h4"}}})");
+  const auto of_layers = [&](const char* layers) { return block("minecraft:snow", {{"layers", layers}}); };
+  const VoxelProperties made = look(pack, of_layers("1").type);
+  EXPECT_EQ(made.shapes.position_count(), 6U);
+  for (int i = 0; i < 100; ++i) {
+    const IVec3 at{i, 2 * i, -i};
+    const std::uint32_t number = position_number(at);
+    EXPECT_EQ(height_at(made, of_layers("1").state, at), number % 2 == 0 ? 1.0F : 2.0F);
+    EXPECT_EQ(height_at(made, of_layers("2").state, at), number % 3 < 2 ? 3.0F : 4.0F);
+    EXPECT_EQ(height_at(made, of_layers("5").state, at), 4.0F) << "the variant without properties";
+  }
+}
+
+TEST(PackChoices, CubesStayCubes) {
+  PackBuilder pack = small_pack();
+  pack.states("stone", R"({"variants": {"": [{"model": "block/stone"}, {"model": "block/stone", "y": 90}]}})");
+  const VoxelProperties stone = look(pack, block("minecraft:stone").type);
+  EXPECT_FALSE(stone.faces.empty());
+  EXPECT_TRUE(stone.shapes.empty());
+  EXPECT_TRUE(stone.orientations.empty());
+}
+
+TEST(PackChoices, TooManyAreNamed) {
+  PackBuilder pack = small_pack();
+  pack.model("block/h1", box_of_height(1));
+  pack.model("block/h2", box_of_height(2));
+  pack.states("dead_bush", R"({"variants": {"": [{"model": "block/h1"}, {"model": "block/h2", "weight": 4096}]}})");
+  BlockLooks looks(pack.files());
+  const TypeAndState bush = block("minecraft:dead_bush");
+  const VoxelProperties heavy = looks.applied(bush.type);
+  EXPECT_EQ(heavy.shapes.position_count(), 1U);
+  EXPECT_EQ(height_at(heavy, bush.state, {1, 2, 3}), 2.0F) << "the heaviest one";
+  EXPECT_EQ(looks.report().without_choices, 1U);
+  EXPECT_NE(
+      to_string(looks.report()).find("1 block type without choices by position: minecraft:dead_bush (the weights"),
+      std::string::npos)
+      << to_string(looks.report());
+  std::string many;
+  for (int i = 0; i < 65; ++i) {
+    const std::string name = "block/m" + std::to_string(i);
+    pack.model(name, box_of_height(1 + i % 15));
+    many += (i == 0 ? "{" : ", {") + (R"("model": ")" + name + "\"}");
+  }
+  pack.states("dead_bush", R"({"variants": {"": [)" + many + "]}}");
+  EXPECT_EQ(report_of(pack, bush.type).without_choices, 1U) << "more than 64 parts";
+}
+
+TEST(PackLooks, TheFirstVariantWins) {
+  PackBuilder pack = small_pack();
+  for (const int height : {1, 2, 3}) pack.model("block/h" + std::to_string(height), box_of_height(height));
+  // The variant without properties shows in all states without another one; overlapping variants do not add up.
+  pack.states("snow", R"({"variants": {"layers=3": {"model": "block/h3"}, "": {"model": "block/h1"}}})");
+  const auto height_of = [&](const char* layers) {
+    const TypeAndState snow = block("minecraft:snow", {{"layers", layers}});
+    return height_at(look(pack, snow.type), snow.state, IVec3(0));
+  };
+  EXPECT_EQ(height_of("3"), 3.0F);
+  EXPECT_EQ(height_of("1"), 1.0F);
+  EXPECT_EQ(height_of("8"), 1.0F);
+  const TypeAndState snow = block("minecraft:snow", {{"layers", "3"}});
+  EXPECT_EQ(look(pack, snow.type).shapes.model(snow.state, {}, {}).boxes.size(), 1U);
+}
+
+TEST(PackLooks, ColourMapsGiveTintsByClimate) {
+  PackBuilder pack = small_pack();
+  add_block(pack, "grass_block", R"({"parent": "block/cube", "textures": {"up": "block/red", "down": "block/red",
+    "north": "block/red", "south": "block/red", "east": "block/red", "west": "block/red"}})");
+  pack.model("block/cube", R"({"elements": [{"from": [0, 0, 0], "to": [16, 16, 16], "faces": {
+    "up": {"texture": "#up", "tintindex": 0}, "down": {"texture": "#down"}, "north": {"texture": "#north"},
+    "south": {"texture": "#south"}, "east": {"texture": "#east"}, "west": {"texture": "#west"}}}]})");
+  const auto tint_in = [&](const char* biome) {
+    const TypeAndState grass = block("minecraft:grass_block", {{"snowy", "false"}}, minecraft::tints_of_biome(biome));
+    return look(pack, grass.type).faces[Direction::PosY].tint;
+  };
+  EXPECT_EQ(tint_in("minecraft:plains"), minecraft::colour_of_rgb(0x91BD59)) << "without a map";
+  // The map's red is its column, its green the row.
+  pack.texture("colormap/grass", packs_test::png(256, [](int x, int y) {
+                 return Rgba8{static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(y), 77};
+               }));
+  const auto pixel = [](double share) { return static_cast<std::uint8_t>((1.0F - static_cast<float>(share)) * 255); };
+  EXPECT_EQ(tint_in("minecraft:plains"), (Rgba8{pixel(0.8), pixel(0.8F * 0.4F), 77}));
+  EXPECT_EQ(tint_in("minecraft:desert"), (Rgba8{0, 255, 77}));
+  EXPECT_EQ(tint_in("minecraft:snowy_plains"), (Rgba8{255, 255, 77}));
+  EXPECT_EQ(tint_in("minecraft:swamp"), minecraft::colour_of_rgb(0x6A7039)) << "not from a map";
+  const Rgba8 forest = tint_in("minecraft:forest");
+  const Rgba8 dark = tint_in("minecraft:dark_forest");
+  EXPECT_EQ(dark.r, (forest.r / 2 * 2 + 0x28) / 2);
+  EXPECT_EQ(dark.b, (76 + 0x0A) / 2);
+  pack.texture("colormap/grass", packs_test::plain_png(kRed, 16));
+  EXPECT_EQ(tint_in("minecraft:plains"), minecraft::colour_of_rgb(0x91BD59));
+  const TypeAndState grass = block("minecraft:grass_block", {{"snowy", "false"}}, minecraft::BiomeTints());
+  EXPECT_NE(to_string(report_of(pack, grass.type)).find("a colour map has 256 x 256 pixels"), std::string::npos);
 }
 
 TEST(BlockPacks, BuiltinPackHasEveryBlock) {

@@ -42,15 +42,15 @@ std::optional<std::uint32_t> parse_colour(std::string_view text) {
 }
 
 /// Returns the colour of a block; `name` may be a texture's, such as "furnace_side".
-Rgba8 colour_of_block(const PackName& block) {
+Rgba8 colour_of_block(const ResourceName& block) {
   constexpr std::array<std::string_view, 8> kEnds = {"_top",  "_side", "_front", "_bottom",
                                                      "_back", "_end",  "_inner", "_on"};
-  std::string name = block.name;
+  std::string name = block.path;
   for (const std::string_view end : kEnds) {
     if (name.ends_with(end) && name.size() > end.size()) name.resize(name.size() - end.size());
   }
-  const minecraft::BlockLook whole = minecraft::look_of_block(block.space + ":" + block.name, false, false);
-  if (whole.knowledge == minecraft::Knowledge::Table || name == block.name) return whole.colour;
+  const minecraft::BlockLook whole = minecraft::look_of_block(block.space + ":" + block.path, false, false);
+  if (whole.knowledge == minecraft::Knowledge::Table || name == block.path) return whole.colour;
   return minecraft::look_of_block(block.space + ":" + name, false, false).colour;
 }
 
@@ -97,14 +97,14 @@ void add_layer(const Pattern& pattern, Vec3 colour, float opacity, std::array<Ve
 
 }  // namespace
 
-std::optional<PackName> pack_file_name(std::string_view path, std::string_view folder, std::string_view end) {
+std::optional<ResourceName> pack_file_name(std::string_view path, std::string_view folder, std::string_view end) {
   constexpr std::string_view kTop = "assets/";
   if (!path.starts_with(kTop) || !path.ends_with(end)) return std::nullopt;
   path = path.substr(kTop.size(), path.size() - kTop.size() - end.size());
   const std::size_t slash = path.find('/');
   if (slash == std::string_view::npos || !path.substr(slash + 1).starts_with(folder)) return std::nullopt;
-  PackName name{std::string(path.substr(0, slash)), std::string(path.substr(slash + 1 + folder.size()))};
-  return name.name.empty() ? std::nullopt : std::optional(std::move(name));
+  ResourceName name{std::string(path.substr(0, slash)), std::string(path.substr(slash + 1 + folder.size()))};
+  return name.path.empty() ? std::nullopt : std::optional(std::move(name));
 }
 
 namespace {
@@ -156,16 +156,16 @@ Result<TextureRecipes> TextureRecipes::from_text(std::string_view table) {
   return made;
 }
 
-std::optional<AlphaImage> TextureRecipes::draw(const PackName& texture) const {
+std::optional<AlphaImage> TextureRecipes::draw(const ResourceName& texture) const {
   constexpr std::string_view kFolder = "block/";
-  if (!texture.name.starts_with(kFolder)) return std::nullopt;
-  PackName name{texture.space, texture.name.substr(kFolder.size())};
-  const bool is_in_folder = name.name.find('/') != std::string::npos;
-  auto match = is_in_folder ? names_in_folders_.find(name.name) : names_.find(name.name);
+  if (!texture.path.starts_with(kFolder)) return std::nullopt;
+  ResourceName name{texture.space, texture.path.substr(kFolder.size())};
+  const bool is_in_folder = name.path.find('/') != std::string::npos;
+  auto match = is_in_folder ? names_in_folders_.find(name.path) : names_.find(name.path);
   if (!match && texture.space == "quoin") {  // "quoin:block/SPACE/NAME": of an unknown block
-    const std::size_t slash = name.name.find('/');
-    if (slash != std::string::npos) name = {name.name.substr(0, slash), name.name.substr(slash + 1)};
-    match = names_.find(name.name);
+    const std::size_t slash = name.path.find('/');
+    if (slash != std::string::npos) name = {name.path.substr(0, slash), name.path.substr(slash + 1)};
+    match = names_.find(name.path);
     if (!match) match = names_.find("unknown");
   }
   if (!match) return std::nullopt;
@@ -177,7 +177,7 @@ std::optional<AlphaImage> TextureRecipes::draw(const PackName& texture) const {
     if (const auto fixed = parse_colour(layer.colour)) {
       colour = minecraft::colour_of_rgb(*fixed);
     } else {
-      std::string block = with_stars(replaced(layer.colour, "self", name.name), match->stars);
+      std::string block = with_stars(replaced(layer.colour, "self", name.path), match->stars);
       colour = colour_of_block({name.space, std::move(block)});
     }
     add_layer(*draw_pattern(layer.pattern), linear_colour(colour) * layer.brightness, layer.alpha, image, alpha);

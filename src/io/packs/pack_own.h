@@ -17,8 +17,8 @@
 namespace quoin::packs {
 
 /// Splits "assets/SPACE/FOLDER/NAME.END" into SPACE and NAME; nullopt for other paths. `folder`: with '/' at its end.
-[[nodiscard]] std::optional<PackName> pack_file_name(std::string_view path, std::string_view folder,
-                                                     std::string_view end);
+[[nodiscard]] std::optional<ResourceName> pack_file_name(std::string_view path, std::string_view folder,
+                                                         std::string_view end);
 
 /// Recipes of textures: layers of patterns (pack_patterns.h), each in the colour of a block or in a fixed colour.
 /// docs/formats/block_pack.md describes the table. Immutable after it was made.
@@ -29,7 +29,7 @@ class TextureRecipes {
 
   /// Draws a texture of 16x16 texels; nullopt if no recipe has its name. Textures of other names that begin with
   /// "quoin:block/" always exist: their patterns follow from the words of the name.
-  [[nodiscard]] std::optional<AlphaImage> draw(const PackName& texture) const;
+  [[nodiscard]] std::optional<AlphaImage> draw(const ResourceName& texture) const;
 
  private:
   struct Layer {
@@ -59,6 +59,7 @@ class OwnPack final : public PackFiles {
   /// models and textures. Errors: LimitExceeded if the file is larger than `max_bytes`.
   [[nodiscard]] Result<std::optional<std::vector<std::byte>>> read(std::string_view path,
                                                                    std::size_t max_bytes) const override;
+  [[nodiscard]] std::string identity() const override { return "builtin"; }
 
  private:
   BlockFamilies families_;

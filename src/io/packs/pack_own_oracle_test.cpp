@@ -93,7 +93,7 @@ class Reader {
     std::vector<StateModel> found;
     for (const StateCase& each : states->cases) {
       if (!holds(each, values)) continue;
-      found.push_back(each.models.front());
+      found.push_back(each.heaviest());
       if (!states->is_multipart) break;
     }
     return found;
@@ -106,7 +106,7 @@ class Reader {
       problems.insert("model " + name + ": " + (model ? "absent" : model.error().message));
       return {};
     }
-    for (const PackElement& element : (*model)->elements) {
+    for (const PackElement& element : (*model)->elements()) {
       for (const auto& face : element.faces) {
         if (!face) continue;
         const auto texture = (*model)->texture(face->texture);
@@ -123,7 +123,7 @@ class Reader {
         }
       }
     }
-    return (*model)->elements;
+    return {(*model)->elements().begin(), (*model)->elements().end()};
   }
 
   [[nodiscard]] std::size_t texture_count() const { return textures_.size(); }

@@ -208,7 +208,7 @@ TEST(OwnPack, TexturesInFoldersHaveTheirOwnRecipes) {
   const auto made = TextureRecipes::from_text(
       R"([["*_wool", "flat #FF0000"], ["bed/*", "flat #00FF00"], ["unknown", "flat #0000FF"]])");
   ASSERT_TRUE(made);
-  const auto colour = [&](const PackName& name) { return made->draw(name)->rgba; };
+  const auto colour = [&](const ResourceName& name) { return made->draw(name)->rgba; };
   EXPECT_GT(colour({"quoin", "block/bed/red_wool"})[1], 200);  // by its folder
   EXPECT_GT(colour({"minecraft", "block/red_wool"})[0], 200);  // by its name
   EXPECT_GT(colour({"quoin", "block/mod/red_wool"})[0], 200);  // of a block of a mod

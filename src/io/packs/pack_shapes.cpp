@@ -159,7 +159,7 @@ void put_face(const std::optional<FaceLayer>& layer, Direction direction, const 
 
 }  // namespace
 
-std::vector<ShapeElement> elements_of(const BlockModel& model, const std::vector<PackElement>& elements,
+std::vector<ShapeElement> elements_of(const BlockModel& model, std::span<const PackElement> elements,
                                       const FaceColours& colours, bool has_textures, TextureReader& textures) {
   std::vector<ShapeElement> all;
   for (const PackElement& element : elements) {

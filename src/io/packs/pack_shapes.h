@@ -2,6 +2,7 @@
 
 #include <array>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <quoin/core/axis_orientation.h>
@@ -35,7 +36,7 @@ struct FaceColours {
 /// Returns the elements of a model. Faces that lie on equal faces of earlier elements are blended with these, such as
 /// the grass at the sides of earth. `textures`: makes blended textures, and those of plain faces if `has_textures`;
 /// else such faces have no texture and the plain colour.
-[[nodiscard]] std::vector<ShapeElement> elements_of(const BlockModel& model, const std::vector<PackElement>& elements,
+[[nodiscard]] std::vector<ShapeElement> elements_of(const BlockModel& model, std::span<const PackElement> elements,
                                                     const FaceColours& colours, bool has_textures,
                                                     TextureReader& textures);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <memory>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -54,7 +55,7 @@ int whole_number(const Json& object, const char* key, int otherwise) {
 /// Returns the first frame of an image.
 Frame first_frame(const AlphaImage& image, std::string_view animation) {
   const Frame whole{0, 0, image.width, image.height};
-  if (json_extent(animation).depth > 16) return whole;
+  if (json_extent(animation, JsonComments::Allowed).depth > 16) return whole;
   const Json json = Json::parse(animation, nullptr, false, true);
   const auto found = json.is_object() ? json.find("animation") : json.end();
   if (!json.is_object() || found == json.end() || !found->is_object()) return whole;
@@ -78,17 +79,23 @@ Frame first_frame(const AlphaImage& image, std::string_view animation) {
   return frame;
 }
 
+/// Returns the pixel of `length` in the middle of texel `i` of `size`.
+int middle_of(int i, int size, int length) {
+  return static_cast<int>((2 * std::int64_t{i} + 1) * length / (2 * std::int64_t{size}));
+}
+
 /// Returns a square image of a frame, with sides that textures can have.
-AlphaImage squared(const AlphaImage& image, const Frame& frame) {
+AlphaImage squared(AlphaImage image, const Frame& frame) {
   const auto longest = static_cast<unsigned>(std::max(frame.width, frame.height));
   const int size = std::clamp(static_cast<int>(std::bit_ceil(longest)), kMinTextureSize, kMaxTextureSize);
+  if (frame.width == size && frame.height == size && image.width == size && image.height == size) return image;
   AlphaImage made{size, size, {}};
   made.rgba.resize(static_cast<std::size_t>(size) * static_cast<std::size_t>(size) * 4);
   std::size_t to = 0;
   for (int y = 0; y < size; ++y) {
-    const int row = frame.y + (2 * y + 1) * frame.height / (2 * size);
+    const int row = frame.y + middle_of(y, size, frame.height);
     for (int x = 0; x < size; ++x) {
-      const int column = frame.x + (2 * x + 1) * frame.width / (2 * size);
+      const int column = frame.x + middle_of(x, size, frame.width);
       const std::size_t from = 4 * (static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width) +
                                     static_cast<std::size_t>(column));
       for (std::size_t i = 0; i < 4; ++i) made.rgba[to++] = image.rgba[from + i];
@@ -157,42 +164,53 @@ std::string text_of_layer(const FaceLayer& layer) {
 
 }  // namespace
 
-Result<PackTexture> texture_of_png(const std::string& name, std::span<const std::byte> png,
-                                   std::string_view animation) {
+Result<PackTexture> texture_of_png(const std::string& name, std::vector<std::byte> png, std::string_view animation) {
   const auto size = size_of_png(png);
   if (!size) return make_error(ErrorCode::BadFormat, "not a PNG image");
   if (std::uint64_t{size->width} * size->height > kMaxPixels) {
     return make_error(ErrorCode::LimitExceeded, "an image of " + std::to_string(size->width) + " x " +
                                                     std::to_string(size->height) + " pixels: at most 2^24 are read");
   }
-  const auto image = read_alpha_image(png);
+  auto image = read_alpha_image(png);
   if (!image) return image.error();
-  return texture_of(name, squared(*image, first_frame(*image, animation)));
+  const Frame frame = first_frame(*image, animation);
+  AlphaImage square = squared(std::move(*image), frame);
+  if (square.width < kDeferredTextureSize) return texture_of(name, std::move(square));
+  PackTexture made;
+  made.alpha = settle_alpha(square);
+  auto decode = [kept = std::make_shared<const std::vector<std::byte>>(std::move(png)), frame] {
+    auto again = read_alpha_image(*kept);
+    QUOIN_ASSERT(again, "an image that was decoded before");
+    AlphaImage texels = squared(std::move(*again), frame);
+    settle_alpha(texels);
+    return texels;
+  };
+  auto texture = Texture::deferred(name, square, std::move(decode));
+  if (!texture) return texture.error();
+  made.texture = std::move(*texture);
+  return made;
+}
+
+TextureReader::Known TextureReader::read(const ResourceName& name) const {
+  const std::string path = "assets/" + name.space + "/textures/" + name.path + ".png";
+  const auto named = [&](Error error) {
+    if (error.path.empty()) error.path = path;
+    return error;
+  };
+  auto png = pack_.read(path, kMaxImageBytes);
+  if (!png) return named(png.error());
+  if (!*png) return std::optional<PackTexture>();
+  const auto text = pack_.read(path + ".mcmeta", kMaxAnimationBytes);
+  const std::string animation(text && *text ? text_of(**text) : std::string_view());
+  auto made = texture_of_png(to_string(name), std::move(**png), animation);
+  if (!made) return named(made.error());
+  return std::optional(std::move(*made));
 }
 
 Result<const PackTexture*> TextureReader::texture(const ResourceName& name) {
   const std::string key = to_string(name);
   auto known = known_.find(key);
-  if (known == known_.end()) {
-    const std::string path = "assets/" + name.space + "/textures/" + name.path + ".png";
-    const auto read = [&]() -> Result<std::optional<PackTexture>> {
-      const auto png = pack_.read(path, kMaxImageBytes);
-      if (!png) return png.error();
-      if (!*png) return std::optional<PackTexture>();
-      const auto size = size_of_png(**png);
-      std::string animation;
-      if (size && size->width != size->height) {
-        const auto text = pack_.read(path + ".mcmeta", kMaxAnimationBytes);
-        if (text && *text) animation = std::string(text_of(**text));
-      }
-      auto made = texture_of_png(key, **png, animation);
-      if (!made) return made.error();
-      return std::optional(std::move(*made));
-    };
-    auto result = read();
-    if (!result && result.error().path.empty()) result.error().path = path;
-    known = known_.emplace(key, std::move(result)).first;
-  }
+  if (known == known_.end()) known = known_.emplace(key, read(name)).first;
   if (!known->second) return known->second.error();
   return known->second->has_value() ? &**known->second : nullptr;
 }

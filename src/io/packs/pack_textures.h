@@ -8,6 +8,8 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include <quoin/core/image.h>
 #include <quoin/core/result.h>
@@ -26,11 +28,14 @@ struct PackTexture {
   FaceAlpha alpha = FaceAlpha::Opaque;
 };
 
+/// Textures with at least this side keep their PNG instead of their texels until these are read (Texture::deferred).
+inline constexpr int kDeferredTextureSize = 64;
+
 /// Makes a texture of a PNG: its first frame, if `animation` is the text of its .mcmeta file with an animation. An
 /// image is sampled by its nearest pixels unless it is a square with a power of two from 16 to 1,024 as side.
 ///
 /// Errors: BadFormat for images that are no PNG; LimitExceeded above 2^24 pixels, before it is decoded.
-[[nodiscard]] Result<PackTexture> texture_of_png(const std::string& name, std::span<const std::byte> png,
+[[nodiscard]] Result<PackTexture> texture_of_png(const std::string& name, std::vector<std::byte> png,
                                                  std::string_view animation = {});
 
 /// One texture on a face of an element: the look, and the part that the face shows (ElementFace::part).
@@ -42,7 +47,7 @@ struct FaceLayer {
 /// Maximum number of texels of blended textures: 256 MiB, without mipmaps.
 inline constexpr std::size_t kMaxBlendedTexels = std::size_t{1} << 26;
 
-/// Reads textures by name, each once. Threads: one at a time. Lifetime: the pack.
+/// Reads textures by name, each once. Threads: one at a time, except for `read`. Lifetime: the pack.
 class TextureReader {
  public:
   explicit TextureReader(const PackFiles& pack, std::size_t max_blended_texels = kMaxBlendedTexels)
@@ -51,6 +56,13 @@ class TextureReader {
   /// Returns a texture; null if the pack does not have it. Errors: those of texture_of_png and PackFiles::read, with
   /// the file.
   [[nodiscard]] Result<const PackTexture*> texture(const ResourceName& name);
+  /// The result of reading a texture; nullopt if the pack does not have it.
+  using Known = Result<std::optional<PackTexture>>;
+  [[nodiscard]] bool knows(const ResourceName& name) const { return known_.contains(to_string(name)); }
+  /// Reads a texture as `texture` does, without remembering it. Threads: any number at once.
+  [[nodiscard]] Known read(const ResourceName& name) const;
+  /// Remembers the result of `read`, unless the texture is known.
+  void put(const ResourceName& name, Known read) { known_.emplace(to_string(name), std::move(read)); }
   /// Returns a texture of one opaque colour.
   [[nodiscard]] const PackTexture& plain(Rgba8 colour);
   /// Returns the layer that shows both: `upper` with its alpha over `lower`; or only `lower` if it is null. Its tint is
@@ -63,7 +75,7 @@ class TextureReader {
  private:
   const PackFiles& pack_;
   std::size_t max_blended_texels_;
-  std::map<std::string, Result<std::optional<PackTexture>>> known_;
+  std::map<std::string, Known> known_;
   std::map<std::string, PackTexture> made_;
   std::size_t blended_texels_ = 0;
   std::size_t refused_blends_ = 0;

@@ -6,6 +6,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include <quoin/core/assert.h>
 
@@ -32,6 +33,11 @@ bool joins_neighbours(std::string_view block) {
   return std::ranges::any_of(
       std::array<std::string_view, 6>{"fence", "_pane", "iron_bars", "copper_bars", "_wall", "redstone_wire"},
       [&](std::string_view end) { return block.ends_with(end); });
+}
+
+Error too_many_conditions() {
+  return make_error(ErrorCode::LimitExceeded,
+                    "more than " + std::to_string(kMaxTypeConditions) + " conditions of a block");
 }
 
 bool contains_value(const StateTerm& term, std::string_view value) {
@@ -117,10 +123,6 @@ std::vector<ShapeCondition> TypeStates::with_corners(const std::vector<ShapeCond
 }
 
 Status TypeStates::restrict(std::vector<ShapeCondition>& all, const StateTerm& term) const {
-  const auto too_many = [] {
-    return make_error(ErrorCode::LimitExceeded,
-                      "more than " + std::to_string(kMaxTypeConditions) + " conditions of a block");
-  };
   const minecraft::StateField* const found = field(term.property);
   if (found == nullptr) {
     const auto named = std::ranges::find(named_, term.property, &std::pair<std::string, std::string>::first);
@@ -150,14 +152,14 @@ Status TypeStates::restrict(std::vector<ShapeCondition>& all, const StateTerm& t
     if (code && std::ranges::find(codes, *code) == codes.end()) codes.push_back(*code);
   }
   if (term.is_negated) {
-    if (found->bits > kMaxNegatedBits) return too_many();
+    if (found->bits > kMaxNegatedBits) return too_many_conditions();
     std::vector<std::uint32_t> others;
     for (std::uint32_t code = 0; code < 1U << found->bits; ++code) {
       if (std::ranges::find(codes, code) == codes.end()) others.push_back(code);
     }
     codes = std::move(others);
   }
-  if (codes.size() * all.size() > kMaxTypeConditions) return too_many();
+  if (codes.size() * all.size() > kMaxTypeConditions) return too_many_conditions();
   std::vector<ShapeCondition> restricted;
   for (const ShapeCondition& condition : all) {
     for (const std::uint32_t code : codes) {
@@ -186,13 +188,70 @@ Result<std::vector<ShapeCondition>> TypeStates::conditions(const StateCase& of) 
     };
     std::erase_if(met, is_contradiction);
     if (all.size() + met.size() > kMaxTypeConditions) {
-      return make_error(ErrorCode::LimitExceeded,
-                        "more than " + std::to_string(kMaxTypeConditions) + " conditions of a block");
+      return too_many_conditions();
     }
     for (const ShapeCondition& each : met) {
       if (each == ShapeCondition{}) return std::vector<ShapeCondition>(1);
       if (std::ranges::find(all, each) == all.end()) all.push_back(each);
     }
+  }
+  return all;
+}
+
+namespace {
+
+/// Appends conditions that hold where one does and another does not.
+void append_without(const ShapeCondition& one, const ShapeCondition& taken, std::vector<ShapeCondition>& out) {
+  const bool is_apart = ((one.state ^ taken.state) & one.state_mask & taken.state_mask) != 0 ||
+                        (one.connected.bits() & taken.unconnected.bits()) != 0 ||
+                        (one.unconnected.bits() & taken.connected.bits()) != 0 ||
+                        (one.corner && taken.corner && *one.corner != *taken.corner);
+  if (is_apart) {
+    out.push_back(one);
+    return;
+  }
+  // Takes off one bit, side and corner after the other. `rest` has all that were equal.
+  ShapeCondition rest = one;
+  for (std::uint32_t left = taken.state_mask & ~one.state_mask; left != 0; left &= left - 1) {
+    const std::uint32_t bit = left & (~left + 1);
+    ShapeCondition other = rest;
+    other.state_mask = rest.state_mask |= bit;
+    other.state |= ~taken.state & bit;
+    rest.state |= taken.state & bit;
+    out.push_back(other);
+  }
+  for (const Direction side : kDirections) {
+    if (taken.connected.contains(side) && !rest.connected.contains(side)) {
+      out.push_back(rest);
+      out.back().unconnected.insert(side);
+      rest.connected.insert(side);
+    }
+    if (taken.unconnected.contains(side) && !rest.unconnected.contains(side)) {
+      out.push_back(rest);
+      out.back().connected.insert(side);
+      rest.unconnected.insert(side);
+    }
+  }
+  if (!taken.corner || rest.corner) return;
+  using enum StairCorner;
+  for (const StairCorner corner : {Straight, OuterLeft, OuterRight, InnerLeft, InnerRight}) {
+    if (corner == *taken.corner) continue;
+    out.push_back(rest);
+    out.back().corner = corner;
+  }
+}
+
+}  // namespace
+
+Result<std::vector<ShapeCondition>> conditions_without(std::vector<ShapeCondition> all,
+                                                       const std::vector<ShapeCondition>& taken) {
+  std::vector<ShapeCondition> rest;
+  for (const ShapeCondition& each : taken) {
+    rest.clear();
+    for (const ShapeCondition& one : all) append_without(one, each, rest);
+    if (rest.size() > kMaxTypeConditions) return too_many_conditions();
+    std::swap(all, rest);
+    if (all.empty()) break;
   }
   return all;
 }

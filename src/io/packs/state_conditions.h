@@ -70,7 +70,12 @@ class TypeStates {
   bool has_corners_ = false;
 };
 
-/// Returns true if a state satisfies a condition, apart from connections.
+/// Returns conditions that hold where one of `all` does and none of `taken`. Positions are not regarded.
+/// Errors: LimitExceeded for kMaxTypeConditions.
+[[nodiscard]] Result<std::vector<ShapeCondition>> conditions_without(std::vector<ShapeCondition> all,
+                                                                     const std::vector<ShapeCondition>& taken);
+
+/// Returns true if a state satisfies a condition, apart from connections, corners and positions.
 [[nodiscard]] inline bool holds(const ShapeCondition& condition, std::uint32_t state) {
   return (state & condition.state_mask) == condition.state;
 }

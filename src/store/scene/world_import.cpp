@@ -35,7 +35,8 @@ constexpr std::size_t kMaxLines = 1'000;
 /// Maximum number of pending saves.
 constexpr std::size_t kMaxSaves = 2;
 
-/// Returns an identity that differs between sources, and changes when files of a source are added or removed.
+/// Returns an identity that differs between sources and resource packs, and changes when files of a source are added or
+/// removed.
 std::string identity_of(const ChunkSource& source) {
   std::uint64_t hash = 1469598103934665603U;
   for (const IBox& part : source.parts()) {
@@ -43,7 +44,9 @@ std::string identity_of(const ChunkSource& source) {
       hash = (hash ^ static_cast<std::uint32_t>(number)) * 1099511628211U;
     }
   }
-  return source.info().format + ", " + std::to_string(source.parts().size()) + " parts, " + std::to_string(hash);
+  const std::string& packs = source.info().packs;
+  return source.info().format + ", " + std::to_string(source.parts().size()) + " parts, " + std::to_string(hash) +
+         (packs.empty() ? "" : ", packs: " + packs);
 }
 
 /// The progress of an import. Saved together with the chunks that it counts.
@@ -80,7 +83,8 @@ Result<Done> parse_done(std::span<const std::byte> bytes, const std::string& ide
   if (!json.is_object() || json.value("source", Json()) != identity) {
     return make_error(
         ErrorCode::InvalidArgument,
-        "is an unfinished import of another source, or of an older state of this one; remove it to start again");
+        "is an unfinished import of another source, of an older state of this one, or with other resource packs; "
+        "remove it to start again");
   }
   Done done;
   done.parts = number("parts");

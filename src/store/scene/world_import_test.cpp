@@ -1,10 +1,13 @@
 #include <quoin/store/world_import.h>
 
 #include <filesystem>
+#include <vector>
+
 #include <unistd.h>
 
 #include <gtest/gtest.h>
 
+#include <quoin/io/block_packs.h>
 #include <quoin/io/file.h>
 #include <quoin/store/world_saver.h>
 
@@ -108,6 +111,25 @@ TEST_F(WorldImport, ResumedImportsMatchUninterruptedImports) {
   for (const IVec3 place : grid_of(whole).chunks()) {
     EXPECT_TRUE(*grid_of(parts).find_chunk(place) == *grid_of(whole).find_chunk(place));
   }
+}
+
+TEST_F(WorldImport, RefusesToResumeWithOtherPacks) {
+  const auto packed = [&](const char* name) {
+    fs::create_directories(folder / name / "assets");
+    const std::vector<fs::path> packs = {folder / name};
+    return with_packs(open(), *BlockPacks::open(packs));
+  };
+  int calls = 0;
+  const auto stop = [&](double) { return calls++ == 0; };
+  ASSERT_FALSE(import_world(*packed("pack 1"), folder / "out.quoin", {1}, stop));
+  for (const bool has_packs : {true, false}) {
+    const auto source = has_packs ? packed("pack 2") : open();
+    const auto other = import_world(*source, folder / "out.quoin");
+    ASSERT_FALSE(other);
+    EXPECT_EQ(other.error().code, ErrorCode::InvalidArgument);
+    EXPECT_NE(other.error().message.find("with other resource packs"), std::string::npos) << other.error().message;
+  }
+  EXPECT_TRUE(import_world(*packed("pack 1"), folder / "out.quoin")) << "the same packs";
 }
 
 TEST_F(WorldImport, RefusesToResumeWithOtherSource) {
