@@ -771,6 +771,25 @@ TEST(PackLooks, TheFirstVariantWins) {
   EXPECT_EQ(look(pack, snow.type).shapes.model(snow.state, {}, {}).boxes.size(), 1U);
 }
 
+// Corners follow neighbours, so states alone do not turn a cube.
+TEST(PackLooks, CornersOfStairsAreNoOrientations) {
+  PackBuilder pack = small_pack();
+  std::string variants;
+  for (const char* facing : {"east", "south", "west", "north"}) {
+    for (const char* half : {"bottom", "top"}) {
+      for (const char* shape : {"straight", "inner_left", "inner_right", "outer_left", "outer_right"}) {
+        variants += std::string(variants.empty() ? "" : ",") + "\"facing=" + facing + ",half=" + half +
+                    ",shape=" + shape + R"(": {"model": "block/stone", "y": )" +
+                    (shape == std::string("straight") ? "0" : "90") + "}";
+      }
+    }
+  }
+  pack.states("oak_stairs", R"({"variants": {)" + variants + "}}");
+  const VoxelProperties old = look(pack, block("minecraft:oak_stairs", {{"facing", "west"}, {"half", "top"}}).type);
+  ASSERT_FALSE(old.shapes.empty());
+  EXPECT_EQ(old.shapes.rules().neighbours, ShapeNeighbours::Stairs);
+}
+
 TEST(PackLooks, ColourMapsGiveTintsByClimate) {
   PackBuilder pack = small_pack();
   add_block(pack, "grass_block", R"({"parent": "block/cube", "textures": {"up": "block/red", "down": "block/red",

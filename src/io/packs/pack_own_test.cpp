@@ -54,6 +54,13 @@ std::string fault_of(const std::string& families, const std::string& rules = kRu
   return made ? "none" : made.error().message;
 }
 
+TEST(OwnPack, LongNamesHaveTheModelsOfShortOnes) {
+  const BlockFamilies& families = OwnPack::instance()->families();
+  const std::string name = "mod_" + std::string(200, '_') + "a_stairs";
+  EXPECT_TRUE(families.model({"mod", "block/" + name}));
+  EXPECT_FALSE(families.model({"mod", "block/" + name + "_none"}));
+}
+
 TEST(NamePatterns, MatchesStarsWithAsFewCharactersAsPossible) {
   EXPECT_EQ(match_name("*_stairs", "oak_stairs"), std::vector<std::string>{"oak"});
   EXPECT_EQ(match_name("dead_*_coral", "dead_tube_coral"), std::vector<std::string>{"tube"});
