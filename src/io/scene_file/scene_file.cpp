@@ -158,36 +158,46 @@ class ScenePacks {
   ScenePacks(const std::filesystem::path& path, const LoadOptions& options) : path_(path), options_(options) {}
 
   /// Gives types of the scene itself their looks. Errors: those of BlockPacks::open.
-  Status apply(VoxelRegistry& types) { return apply_stack({}, types); }
+  Status apply(VoxelRegistry& types) { return apply_stack({}, "", types); }
 
   /// Gives the types of a file that the scene names their looks. Leaves out packs that cannot be used, with a warning.
   Status apply(const SceneFile::Source& source, VoxelRegistry& types, LoadedScene& loaded) {
     std::vector<std::filesystem::path> usable;
+    std::string names;
     for (const SceneFile::Pack& pack : source.packs) {
       if (!options_.scene_packs) break;
-      if (auto found = find(pack, loaded)) usable.push_back(std::move(*found));
+      auto found = find(pack, loaded);
+      if (!found) continue;
+      usable.push_back(std::move(*found));
+      names += printable(pack.file) + ": ";
     }
-    return apply_stack(usable, types);
+    return apply_stack(std::move(usable), names, types);
   }
 
   /// Adds a warning for each stack of packs that lacks something.
   void report(LoadedScene& loaded) const {
-    for (const auto& [list, packs] : opened_) {
-      std::string line = packs == nullptr ? "" : to_string(packs->report());
-      if (!line.empty()) loaded.warnings.push_back(std::move(line));
+    for (const auto& [list, stack] : opened_) {
+      const std::string line = stack.packs == nullptr ? "" : to_string(stack.packs->report());
+      if (!line.empty()) loaded.warnings.push_back(stack.names + line);
     }
   }
 
  private:
-  Status apply_stack(std::vector<std::filesystem::path> stack, VoxelRegistry& types) {
-    stack.insert(stack.end(), options_.packs.begin(), options_.packs.end());
-    const auto [at, is_new] = opened_.try_emplace(stack);
-    if (is_new && !(stack.empty() && options_.pack_zips.empty())) {
-      auto packs = BlockPacks::open(stack, options_.pack_zips);
+  struct Stack {
+    std::shared_ptr<BlockPacks> packs = nullptr;  // null: none
+    std::string names{};                          // of the scene's packs, each with a colon
+  };
+
+  Status apply_stack(std::vector<std::filesystem::path> paths, const std::string& names, VoxelRegistry& types) {
+    paths.insert(paths.end(), options_.packs.begin(), options_.packs.end());
+    const auto [at, is_new] = opened_.try_emplace(paths);
+    Stack& stack = at->second;
+    if (is_new && !(paths.empty() && options_.pack_zips.empty())) {
+      auto packs = BlockPacks::open(paths, options_.pack_zips);
       if (!packs) return packs.error();
-      at->second = std::move(*packs);
+      stack = {std::move(*packs), names};
     }
-    if (at->second != nullptr) at->second->apply(types);
+    if (stack.packs != nullptr) stack.packs->apply(types);
     return {};
   }
 
@@ -223,7 +233,7 @@ class ScenePacks {
 
   const std::filesystem::path& path_;
   const LoadOptions& options_;
-  std::map<std::vector<std::filesystem::path>, std::shared_ptr<BlockPacks>> opened_;           // null: no packs
+  std::map<std::vector<std::filesystem::path>, Stack> opened_;
   std::map<std::pair<std::string, std::string>, std::optional<std::filesystem::path>> found_;  // by path and hash
 };
 

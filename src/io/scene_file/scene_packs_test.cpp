@@ -158,6 +158,16 @@ TEST_F(ScenePacksTest, DifferPerFile) {
   EXPECT_EQ(textured, 1U);
 }
 
+TEST_F(ScenePacksTest, WarnOfMissingLooks) {
+  PackTexts texts = stone_pack(kRed);
+  texts.erase("assets/minecraft/textures/block/stone.png");
+  write_zip(in_scene("red.zip"), texts);
+  const auto loaded = load({{"red.zip"}});
+  ASSERT_TRUE(loaded);
+  ASSERT_EQ(loaded->warnings.size(), 1U);
+  EXPECT_TRUE(loaded->warnings[0].starts_with("red.zip: resource packs: 1 texture missing")) << loaded->warnings[0];
+}
+
 TEST_F(ScenePacksTest, WarnOfMissingAndChangedPacks) {
   write_zip(in_scene("red.zip"), stone_pack(kRed));
   const auto entry = scene_pack_of(in_scene("red.zip"), in_scene("scene.json"));
