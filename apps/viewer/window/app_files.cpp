@@ -192,6 +192,8 @@ void App::adopt(OpenDocument opened) {
     if (world->is_whole() && !loaded.camera) unframed_ = state_.camera.camera();
     if (!world->why_not_written().empty() && options_.screenshot.empty()) {
       state_.report("this world is read-only: " + world->why_not_written());
+    } else if (state_.has_named_packs && options_.screenshot.empty()) {
+      state_.report("--pack has no effect on this world, which stores its looks; quoin convert --pack changes them");
     }
   } else if (loaded.camera) {
     look_through(*loaded.camera);
