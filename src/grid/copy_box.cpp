@@ -207,7 +207,9 @@ class BoxCopy {
         source_(box_from(box)),
         has_data_(from.data_count() != 0 || to.data_count() != 0) {
     const VoxelRegistry* types = options.types;
-    if (orientation != AxisOrientation() && !options.map_state && types != nullptr && types->has_turned_by_state()) {
+    QUOIN_ASSERT(!options.turn_state || types != nullptr, "the types whose states turn");
+    const bool turns = types != nullptr && (options.turn_state || types->has_turned_by_state());
+    if (orientation != AxisOrientation() && !options.map_state && turns) {
       turning_ = types;
       has_data_ = true;
     }
@@ -345,8 +347,7 @@ class BoxCopy {
     const IBox part = intersect({source.min - first, source.max - first}, kWholeChunk);
     for (const VoxelType type : chunk.types()) {
       const VoxelType is_now = mapped(type);
-      if (!turning_->is_turned_by_state(is_now) || (*turning_)[is_now].orientations.turned(0, orientation_) == 0)
-        continue;
+      if (!is_turned(is_now) || turned(is_now, 0) == 0) continue;
       for (int z = part.min.z; z < part.max.z; ++z) {
         for (int y = part.min.y; y < part.max.y; ++y) {
           for (std::uint64_t left = chunk.row_mask(y, z, type); left != 0; left &= left - 1) {
@@ -357,13 +358,23 @@ class BoxCopy {
       }
     }
   }
+  /// Returns true if a type's states turn with the copy. Requires: turning_ is not null.
+  [[nodiscard]] bool is_turned(VoxelType type) const {
+    if (type >= turning_->size()) return false;
+    return options_.turn_state ? (*turning_)[type].state_bits != 0 : turning_->is_turned_by_state(type);
+  }
+  [[nodiscard]] std::uint32_t turned(VoxelType type, std::uint32_t state) const {
+    const VoxelProperties& properties = (*turning_)[type];
+    return options_.turn_state ? options_.turn_state(properties, state, orientation_)
+                               : properties.orientations.turned(state, orientation_);
+  }
   void put_data(IVec3 source, const VoxelData& data) {
     const VoxelType type = mapped(from_.get(source));
     if (type == kAir) return;
     const IVec3 voxel = narrowed(target_of(box_of_voxel(source))).min;
     std::uint32_t state = data.state;
-    if (turning_ != nullptr && turning_->is_turned_by_state(type)) {
-      state = (*turning_)[type].orientations.turned(state, orientation_);
+    if (turning_ != nullptr && is_turned(type)) {
+      state = turned(type, state);
     } else if (state != 0 && options_.map_state != nullptr) {
       state = options_.map_state(type, state);
     }

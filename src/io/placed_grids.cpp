@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <map>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include <glm/gtc/quaternion.hpp>
@@ -12,6 +15,7 @@
 #include <quoin/core/function_ref.h>
 #include <quoin/core/thousands.h>
 #include <quoin/grid/copy_box.h>
+#include <quoin/io/block_packs.h>
 
 #include "core/bytes/text.h"
 
@@ -36,6 +40,23 @@ Status check_types(const Grid& voxels, const VoxelRegistry& types, const std::st
                     owner + " has voxels of type " + std::to_string(*unknown) + ", which is not registered");
 }
 
+/// Turns the states of blocks, each once.
+class StateTurns {
+ public:
+  std::uint32_t operator()(const VoxelProperties& type, std::uint32_t state, const AxisOrientation& turn) {
+    const auto [known, is_new] = known_.try_emplace({&type, state, turn.index()});
+    if (is_new) {
+      // Files with block names have the states of blocks, which orientations alone do not describe.
+      const auto of_block = turned_block_state(type, state, turn);
+      known->second = of_block ? *of_block : type.orientations.turned(state, turn);
+    }
+    return known->second;
+  }
+
+ private:
+  std::map<std::tuple<const VoxelProperties*, std::uint32_t, int>, std::uint32_t> known_;
+};
+
 /// Counts the content that a format cannot store.
 class Losses {
  public:
@@ -50,18 +71,24 @@ class Losses {
   std::int64_t turned_states = 0;
 
   /// Counts a grid of the file. Requires: its types are registered in the scene.
-  void count(const PlacedGrid& grid, bool is_turned) {
+  void count(const PlacedGrid& grid, const AxisOrientation& orientation) {
     ++placed_;
     states_ += grid.voxels.data_count();
-    if (is_turned && grid.voxels.data_count() != 0) {
-      grid.voxels.for_each_data([&](IVec3, VoxelType type, const VoxelData&) {
-        turned_states += scene_.types.is_turned_by_state(type) ? 0 : 1;
+    if (orientation != AxisOrientation() && grid.voxels.data_count() != 0) {
+      grid.voxels.for_each_data([&](IVec3, VoxelType type, const VoxelData& data) {
+        turned_states += is_turned(type, data.state, orientation) ? 0 : 1;
       });
     }
     for (const VoxelType type : grid.voxels.types()) {
       QUOIN_ASSERT(type < used_.size(), "a registered type");
       used_[type] = true;
     }
+  }
+
+  /// Returns true if a state of a turned copy can have been turned.
+  [[nodiscard]] bool is_turned(VoxelType type, std::uint32_t state, const AxisOrientation& orientation) const {
+    return scene_.types.is_turned_by_state(type) ||
+           turned_block_state(scene_.types[type], state, orientation.inverse()).has_value();
   }
 
   std::vector<std::string> take() {
@@ -208,10 +235,12 @@ class Placer {
     placed.box = {min, min + size};
     CopyOptions turned;
     turned.types = &scene_.types;
+    StateTurns turns;
+    turned.turn_state = std::ref(turns);
     copy_box(grid.grid, box, placed.voxels, min, *orientation, turned);
     if (auto known = check_types(placed.voxels, scene_.types, name_of(instance, grid)); !known) return known;
     if (!placed.name.empty()) ++losses_.nameless;
-    losses_.count(placed, *orientation != AxisOrientation());
+    losses_.count(placed, *orientation);
     take_(std::move(placed));
     return {};
   }

@@ -21,6 +21,12 @@ struct CopyOptions {
   /// StateOrientations::turned, also of voxels whose state is 0. Null: states are copied unchanged.
   /// Lifetime: must outlive the call.
   const VoxelRegistry* types = nullptr;
+  /// Returns the state of a voxel of `types` after the rotation or mirror `turn`, instead of StateOrientations::turned,
+  /// for all types with state bits (VoxelProperties::state_bits), also if the state is 0. Orientations do
+  /// not describe the states of fences and doors, for example: turned_block_state in io/block_packs.h. Requires:
+  /// `types`.
+  std::function<std::uint32_t(const VoxelProperties& type, std::uint32_t state, const AxisOrientation& turn)>
+      turn_state{};
   /// Maps the state (VoxelData) of a copied voxel, for voxels that have a state, instead of `types`: for states that
   /// encode a direction in a way that only the game knows.
   std::function<std::uint32_t(VoxelType type, std::uint32_t state)> map_state{};

@@ -1,12 +1,15 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include <quoin/core/axis_orientation.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/result.h>
 #include <quoin/grid/voxel_registry.h>
@@ -35,7 +38,7 @@ inline constexpr const char* kNoPack = "none";
 
 /// The counts of BlockPacks::apply, over all calls.
 struct BlockPackReport {
-  std::size_t types = 0;           ///< Minecraft blocks
+  std::size_t types = 0;           ///< Minecraft blocks and Luanti nodes
   std::size_t without_look = 0;    ///< of them, blocks without a usable block state or model, which stay as they are
   std::size_t replaced_looks = 0;  ///< blocks with the look of kBuiltinPack, since that of another pack cannot be used
   std::size_t missing_textures = 0;  ///< distinct textures that the packs lack or that cannot be read
@@ -48,7 +51,7 @@ struct BlockPackReport {
 [[nodiscard]] std::string to_string(const BlockPackReport& report);
 
 /// Resource packs of Minecraft (Java): the shapes and textures of blocks. Later packs override earlier ones file by
-/// file, so name the client's .jar first.
+/// file, so name the client's .jar first. A folder of a Luanti game or mod gives textures to Luanti nodes.
 ///
 ///   const std::vector<std::filesystem::path> files = {"client.jar", "my_pack.zip"};
 ///   auto packs = BlockPacks::open(files);
@@ -62,7 +65,7 @@ struct BlockPackReport {
 /// Threads:  any number may call `apply` at once.
 class BlockPacks {
  public:
-  /// Opens packs: folders, zip files or .jar files. kBuiltinPack, at any place, gives a look to the blocks that the
+  /// Opens packs: folders, zip files or .jar files; folders of Luanti games, mods or texture packs. kBuiltinPack, at any place, gives a look to the blocks that the
   /// other packs do not have. Errors: CannotRead, BadFormat; InvalidArgument if a pack has no folder `assets`;
   /// Unsupported in builds without worlds of games; LimitExceeded above 2 GiB.
   [[nodiscard]] static Result<std::shared_ptr<BlockPacks>> open(std::span<const std::filesystem::path> paths);
@@ -75,8 +78,8 @@ class BlockPacks {
   BlockPacks(const BlockPacks&) = delete;
   BlockPacks& operator=(const BlockPacks&) = delete;
 
-  /// Gives the Minecraft blocks of a registry the looks of the packs. Other types, and blocks that the packs do not
-  /// have, stay as they are. Cost: reads each texture and model once, textures on several threads.
+  /// Gives the Minecraft blocks and Luanti nodes of a registry the looks of the packs. Other types, and blocks that the
+  /// packs do not have, stay as they are. Cost: reads each texture and model once, textures on several threads.
   void apply(VoxelRegistry& types, Threads threads = {});
   /// Returns the properties of a type with the looks of the packs.
   [[nodiscard]] VoxelProperties applied(const VoxelProperties& type);
@@ -93,6 +96,19 @@ class BlockPacks {
   explicit BlockPacks(std::unique_ptr<Content> content);
   std::unique_ptr<Content> content_;
 };
+
+/// Returns the state of an imported voxel after a rotation or mirror: of Minecraft blocks by their properties (facing,
+/// halves, sides, hinges, corners of stairs, rails and others), of Luanti nodes by the turns of param2. Returns nullopt
+/// for other types, and for states without a counterpart: a door upside down, stairs on their side. For copies:
+///
+///   CopyOptions options{.types = &scene.types};
+///   options.turn_state = [](const VoxelProperties& type, std::uint32_t state, const AxisOrientation& turn) {
+///     return turned_block_state(type, state, turn).value_or(state);
+///   };
+///
+/// Cost: microseconds.
+[[nodiscard]] std::optional<std::uint32_t> turned_block_state(const VoxelProperties& type, std::uint32_t state,
+                                                              const AxisOrientation& turn);
 
 /// Returns a source whose types have the looks of packs. It is otherwise equal.
 [[nodiscard]] std::unique_ptr<ChunkSource> with_packs(std::unique_ptr<ChunkSource> source,

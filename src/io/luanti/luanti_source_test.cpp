@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <quoin/io/block_packs.h>
 #include <quoin/io/chunk_source.h>
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
@@ -69,6 +70,66 @@ TEST(LuantiMap, ReadsSameNodesFromEveryVersionAndTable) {
       }
     }
   }
+}
+
+TEST(LuantiMap, ShowsShapesOfNodesWithPack) {
+  const WorldFolder folder;
+  Block block;
+  block.names = {{0, "air"},
+                 {1, "default:water_source"},
+                 {2, "default:water_flowing"},
+                 {3, "stairs:stair_wood"},
+                 {4, "default:fence_wood"},
+                 {5, "bad name\n:\xFF"}};
+  block.at(1, 1, 1) = {1, 240};
+  block.at(2, 1, 1) = {2, 4};
+  block.at(4, 4, 4) = {3, 20};  // upside down
+  block.at(8, 8, 8) = {4, 0};
+  block.at(9, 8, 8) = {4, 0};
+  block.at(12, 12, 12) = {5, 255};
+  Map(folder / "map.sqlite").put({0, 0, -1}, row_of(block, 29));
+  LoadOptions options;
+  options.packs = {kBuiltinPack};
+  const auto loaded = load_scene(folder / "map.sqlite", options);
+  ASSERT_TRUE(loaded);
+  const Grid& grid = grid_of(*loaded);
+  const auto shape = [&](IVec3 at) { return shape_at(grid, loaded->scene.types, at); };
+  EXPECT_EQ(grid.data({2, 1, 14}).state, 3U) << "level 4 is a drop of 3";
+  ASSERT_NE(shape({2, 1, 14}), nullptr);
+  EXPECT_LT(shape({2, 1, 14})->min.y + 0.1F, shape({2, 1, 14})->max.y);
+  EXPECT_GT(shape({1, 1, 14})->max.y, shape({2, 1, 14})->max.y - 0.01F);
+  ASSERT_NE(shape({4, 4, 11}), nullptr);
+  EXPECT_TRUE(shape({4, 4, 11})->covers_side[static_cast<std::size_t>(Direction::PosY)]);
+  EXPECT_FALSE(shape({4, 4, 11})->covers_side[static_cast<std::size_t>(Direction::NegY)]);
+  ASSERT_NE(shape({8, 8, 7}), nullptr);
+  EXPECT_EQ(shape({8, 8, 7})->max.x, 1.0F) << "the fence joins the next one";
+  EXPECT_LT(shape({9, 8, 7})->max.x, 1.0F);
+  EXPECT_EQ(shape({12, 12, 3}), nullptr);
+  EXPECT_EQ(grid.data({12, 12, 3}).state, 255U);
+  // Without a pack the same map has cubes.
+  const LoadedScene plain = load(folder / "map.sqlite");
+  EXPECT_EQ(shape_at(grid_of(plain), plain.scene.types, {4, 4, 11}), nullptr);
+}
+
+TEST(LuantiSchematic, KeepsParam2) {
+  const auto schematic = [](bool has_param2) {
+    luanti_test::Writer nodes;
+    nodes.big(0, 2).big(1, 2).big(0x7F7F, 2);
+    if (has_param2) nodes.big(21, 1).big(2, 1);
+    luanti_test::Writer file;
+    file.text("MTSM").big(4, 2).big(2, 2).big(1, 2).big(1, 2).big(0x7F, 1).big(2, 2);
+    for (const std::string_view name : {"stairs:stair_wood", "default:water_flowing"}) {
+      file.big(name.size(), 2).text(name);
+    }
+    return file.append(luanti_test::deflated(nodes.bytes)).bytes;
+  };
+  const auto loaded = load_scene(schematic(true));
+  ASSERT_TRUE(loaded);
+  EXPECT_EQ(grid_of(*loaded).data({0, 0, 0}).state, 21U);
+  EXPECT_EQ(grid_of(*loaded).data({1, 0, 0}).state, 5U) << "level 2 is a drop of 5";
+  const auto cut = load_scene(schematic(false));
+  ASSERT_TRUE(cut);
+  EXPECT_EQ(grid_of(*cut).data({0, 0, 0}).state, 0U);
 }
 
 TEST(LuantiNodes, PassLightAsTheGame) {
@@ -267,7 +328,7 @@ TEST(LuantiMap, RealWorldHasExpectedNodes) {
   }
   // Counted by an independent program.
   EXPECT_EQ(voxels, 1'003'917);
-  // 2,665 nodes with param2, of which 369 flow at the highest level (state 0); 40 flow at level 0.
+  // 2,665 nodes have param2; 369 of them flow at the highest level (state 0). 40 others flow at level 0.
   EXPECT_EQ(with_state, 2'665 - 369 + 40);
   EXPECT_EQ((*source)->types().size() - 1, 46U);
 }

@@ -294,7 +294,7 @@ std::string_view without_game(std::string_view name) {
   return name.starts_with(kGameSpace) ? name.substr(kGameSpace.size()) : name;
 }
 
-/// Returns the block whose name a state tells; removes the state.
+/// Returns the block that a state names; removes the state.
 std::optional<std::string> block_of_kind(std::string_view name, std::vector<Property>& states) {
   const auto kind = std::ranges::find(kBedrockKinds, name, &BedrockKind::name);
   if (kind == kBedrockKinds.end()) return std::nullopt;

@@ -12,6 +12,10 @@
 
 #include "io/packs/pack_files.h"
 #ifndef QUOIN_WITHOUT_GAME_WORLDS
+#include "io/luanti/luanti.h"
+#include "io/minecraft/block_types.h"
+#include "io/minecraft/state_turns.h"
+#include "io/packs/node_pack.h"
 #include "io/packs/pack_looks.h"
 #include "io/packs/pack_own.h"
 #endif
@@ -133,7 +137,18 @@ Result<std::string> hash_of_pack(const std::filesystem::path& /*path*/) {
   return packs_left_out();
 }
 
+std::optional<std::uint32_t> turned_block_state(const VoxelProperties&, std::uint32_t, const AxisOrientation&) {
+  return std::nullopt;
+}
+
 #else
+
+std::optional<std::uint32_t> turned_block_state(const VoxelProperties& type, std::uint32_t state,
+                                                const AxisOrientation& turn) {
+  if (type.attributes.contains(minecraft::kStatesAttribute)) return minecraft::turned_state(type, state, turn);
+  if (type.attributes.contains(models::kNodeStatesAttribute)) return packs::turned_node_state(type, state, turn);
+  return std::nullopt;
+}
 
 namespace {
 

@@ -364,6 +364,8 @@ struct BlockFamilies::Parser {
       traits.fluid = value;
     } else if (key == "joins" && is_one_of(kGroups)) {
       traits.groups = 1U << (kFirstGroup + static_cast<unsigned>(std::ranges::find(kGroups, value) - kGroups.begin()));
+    } else if (key == "mirror" && value == "diagonal") {
+      traits.mirror = value;
     } else {
       return fault("unknown " + key + " " + value);
     }
@@ -388,7 +390,7 @@ struct BlockFamilies::Parser {
         made.is_full = value.get<bool>();
       } else if (key == "joins_full" && value.is_boolean()) {
         made.traits.joins_full_sides = value.get<bool>();
-      } else if ((key == "turn" || key == "fluid" || key == "joins") && value.is_string()) {
+      } else if ((key == "turn" || key == "fluid" || key == "joins" || key == "mirror") && value.is_string()) {
         if (auto status = trait(key, value.get<std::string>(), made.traits); !status) return status;
       } else if (key != "states" && key != "parts") {
         return fault("unknown key " + key);
@@ -638,6 +640,7 @@ BlockFamilies::Traits BlockFamilies::traits(const ResourceName& block) const {
   const Found found = find(block);
   Traits traits = found.family->traits;
   traits.is_fallback = found.is_fallback;
+  traits.is_full = found.family->is_full;
   return traits;
 }
 

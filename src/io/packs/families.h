@@ -70,10 +70,12 @@ class BlockFamilies {
   [[nodiscard]] std::optional<std::string> model(const ResourceName& model) const;
   /// The properties of a family that block-state files cannot have.
   struct Traits {
-    std::string turn;          ///< the rule by which a number in the state turns the block; empty: none
+    std::string turn;          ///< the rule for a number in the state that turns the block; empty: none
     std::string fluid;         ///< "source" or "flowing"; empty: no fluid
     std::uint32_t groups = 0;  ///< bits of the groups whose blocks join each other (ShapeRules::groups); 0: joins none
     bool joins_full_sides = false;
+    std::string mirror;  ///< the mirror that leaves an unturned block as it is: empty: x; "diagonal": exchanges x and z
+    bool is_full = false;      ///< whole cubes
     bool is_fallback = false;  ///< the rule for all names
   };
   [[nodiscard]] Traits traits(const ResourceName& block) const;

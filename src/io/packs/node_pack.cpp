@@ -206,6 +206,23 @@ StateOrientations node_orientations(std::string_view turn) {
   return made;
 }
 
+std::optional<std::uint32_t> turned_node_state(const VoxelProperties& type, std::uint32_t state,
+                                               const AxisOrientation& turn) {
+  const BlockFamilies::Traits traits = NodePack::families().traits(pack_name(type.name));
+  const bool is_upright = turn.apply(Direction::PosY) == Direction::PosY;
+  if (traits.turn.empty()) return is_upright || traits.is_full ? std::optional(state) : std::nullopt;
+  const StateOrientations orientations = node_orientations(traits.turn);
+  AxisOrientation wanted = turn * orientations.of(state);
+  if (wanted.is_mirrored()) {
+    // A mirror that leaves the node as it is turns the orientation into a rotation.
+    wanted = wanted * (traits.mirror == "diagonal" ? AxisOrientation::mirror(2) * AxisOrientation::quarter_turns(1, 1)
+                                                   : AxisOrientation::mirror(0));
+  }
+  const auto found = std::ranges::find(orientations.by_value, wanted);
+  if (found == orientations.by_value.end()) return std::nullopt;
+  return orientations.with_value(state, static_cast<std::size_t>(found - orientations.by_value.begin()));
+}
+
 const BlockFamilies& NodePack::families() {
   static const BlockFamilies parsed = [] {
     auto made = BlockFamilies::from_text(kNodeFamilyTable, kNodeRuleTable, "luanti");

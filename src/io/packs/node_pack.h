@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -8,14 +9,16 @@
 #include <string_view>
 #include <vector>
 
+#include <quoin/core/axis_orientation.h>
 #include <quoin/core/result.h>
+#include <quoin/grid/voxel_registry.h>
 #include <quoin/grid/voxel_shape.h>
 
 #include "io/packs/families.h"
 #include "io/packs/pack_files.h"
 
 // The looks of Luanti nodes: shapes by node name from tables, in the form of a resource pack, and textures of a game's
-// or mod's folder. Node definitions are programs (Lua), so names are all that a map tells about a node.
+// or mod's folder. Node definitions are programs (Lua), so a map contains only names of nodes.
 // docs/formats/luanti.md describes the tables.
 
 namespace quoin::packs {
@@ -27,6 +30,12 @@ namespace quoin::packs {
 /// direction of the wall); empty for other texts. They turn nodes in the axes of grids, where z is mirrored.
 /// Source: Luanti's doc/lua_api.md, "Node paramtypes", and the wall directions in src/mapnode.cpp.
 [[nodiscard]] StateOrientations node_orientations(std::string_view turn);
+
+/// Returns the state of a node after a rotation or mirror, by the turn of its family. Families with a mirror (an axis,
+/// or the diagonal of corners of stairs) have exact states for mirrored nodes too. Returns nullopt if there is none:
+/// families without a turn that do not stay upright.
+[[nodiscard]] std::optional<std::uint32_t> turned_node_state(const VoxelProperties& type, std::uint32_t state,
+                                                             const AxisOrientation& turn);
 
 /// The block states, models and textures of all nodes, made when they are read. Tables are parsed at the first use.
 class NodePack final : public PackFiles {
