@@ -42,6 +42,30 @@ std::optional<std::array<float, kCount>> family_numbers(std::string_view text, f
   return numbers;
 }
 
+/// Returns the part of a texture that a face shows: as in the published format the one at its place in the block, but
+/// moved into the texture if the box leaves the block. Programs that keep all textures in one image would otherwise show
+/// parts of others. `letter`: of the direction.
+std::optional<std::array<float, 4>> part_inside(const std::array<float, 3>& from, const std::array<float, 3>& to,
+                                                char letter) {
+  const bool is_level = letter == 'u' || letter == 'd';
+  const int across = letter == 'e' || letter == 'w' ? 2 : 0;
+  const auto range = [&](int axis, bool is_reversed) -> std::array<float, 2> {
+    const auto at = static_cast<std::size_t>(axis);
+    return is_reversed ? std::array{16.0F - to[at], 16.0F - from[at]} : std::array{from[at], to[at]};
+  };
+  const auto inside = [](std::array<float, 2> part) -> std::array<float, 2> {
+    const float size = std::min(part[1] - part[0], 16.0F);
+    const float start = std::clamp(part[0], 0.0F, 16.0F - size);
+    return {start, start + size};
+  };
+  const std::array<float, 2> u = range(across, letter == 'e' || letter == 'n');
+  const std::array<float, 2> v = is_level ? range(2, letter == 'd') : range(1, true);
+  const std::array<float, 2> moved_u = inside(u);
+  const std::array<float, 2> moved_v = inside(v);
+  if (moved_u == u && moved_v == v) return std::nullopt;
+  return std::array{moved_u[0], moved_v[0], moved_u[1], moved_v[1]};
+}
+
 /// Puts the texts that a pattern's stars stand for, and the name, into a text.
 std::string filled(std::string text, const ResourceName& block, const std::vector<std::string>& stars) {
   text = with_stars(std::move(text), stars);
@@ -578,7 +602,7 @@ std::string BlockFamilies::model_json(const std::vector<Box>& boxes, const Pairs
     for (const auto& [letter, face] : box.faces) {
       const auto& [name, axis, is_high] = sides.at(letter);
       Json side = {{"texture", "#" + face.variable}};
-      if (face.uv) side["uv"] = *face.uv;
+      if (const auto part = face.uv ? face.uv : part_inside(box.from, box.to, letter)) side["uv"] = *part;
       if (face.turn != 0) side["rotation"] = face.turn;
       if (std::ranges::find(tinted, face.variable) != tinted.end()) side["tintindex"] = 0;
       const auto at = static_cast<std::size_t>(axis);

@@ -134,6 +134,25 @@ TEST(BlockFamilies, RenamesVariablesAndPutsNamesIntoTextures) {
   EXPECT_TRUE(made->model({"quoin", "block/mod/thing"}));
 }
 
+TEST(BlockFamilies, MovesDefaultPartsIntoTextures) {
+  const auto faces_of = [](const std::string& box) {
+    const auto made = BlockFamilies::from_text(families_with("0 0 0 16 16 16 *:all", box), kRules);
+    EXPECT_TRUE(made) << box;
+    return Json::parse(*made->model({"minecraft", "block/oak_log"}))["elements"][0]["faces"];
+  };
+  const Json inside = faces_of("2 0 0 16 16 16 *:all");
+  for (const auto& [direction, face] : inside.items()) EXPECT_FALSE(face.contains("uv")) << direction;
+  const Json outside = faces_of("8 9 0 24 17.5 12 *:all e:all@1,2,3,4");
+  EXPECT_EQ(outside["up"]["uv"], Json::parse("[0.0, 0.0, 16.0, 12.0]"));
+  EXPECT_EQ(outside["down"]["uv"], Json::parse("[0.0, 4.0, 16.0, 16.0]"));
+  EXPECT_EQ(outside["north"]["uv"], Json::parse("[0.0, 0.0, 16.0, 8.5]"));
+  EXPECT_EQ(outside["south"]["uv"], Json::parse("[0.0, 0.0, 16.0, 8.5]"));
+  EXPECT_EQ(outside["west"]["uv"], Json::parse("[0.0, 0.0, 12.0, 8.5]"));
+  EXPECT_EQ(outside["east"]["uv"], Json::parse("[1.0, 2.0, 3.0, 4.0]"));
+  const Json large = faces_of("-16 0 8 32 16 8 ns:all");
+  EXPECT_EQ(large["north"]["uv"], Json::parse("[0.0, 0.0, 16.0, 16.0]"));
+}
+
 TEST(OwnPack, StairsTurnWithTheirProperties) {
   const Json states = Json::parse(text_of_own("assets/minecraft/blockstates/oak_stairs.json"));
   EXPECT_EQ(states["variants"].size(), 40U);
