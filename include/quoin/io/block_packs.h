@@ -36,6 +36,16 @@ inline constexpr const char* kNoPack = "none";
 /// Errors: those of BlockPacks::open; LimitExceeded for a folder with more than 1,048,576 files and folders or 2 GiB.
 [[nodiscard]] Result<std::string> hash_of_pack(const std::filesystem::path& path);
 
+/// Returns a part of kBuiltinPack as a zip file in the published format, for other programs or as the base of a pack:
+/// the block states of these blocks, and the models and textures that these name.
+///
+///   const std::vector<std::string> blocks = {"oak_stairs", "minecraft:glass", "some_mod:marble_wall"};
+///   write_file(*write_builtin_pack(blocks), "my_pack.zip");
+///
+/// Errors: InvalidArgument if a name is not one of a block; LimitExceeded above 65,535 files; Unsupported in builds
+///         without worlds of games. The bytes are the same every time.
+[[nodiscard]] Result<std::vector<std::byte>> write_builtin_pack(std::span<const std::string> blocks);
+
 /// The counts of BlockPacks::apply, over all calls.
 struct BlockPackReport {
   std::size_t types = 0;           ///< Minecraft blocks and Luanti nodes

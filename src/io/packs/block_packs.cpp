@@ -117,9 +117,9 @@ struct BlockPacks::Content {
 
 namespace {
 
-Error packs_left_out() {
+Error packs_left_out(const std::string& verb = "read") {
   return make_error(ErrorCode::Unsupported,
-                    "cannot read resource packs: Quoin was built with QUOIN_WITH_GAME_WORLDS=OFF");
+                    "cannot " + verb + " resource packs: Quoin was built with QUOIN_WITH_GAME_WORLDS=OFF");
 }
 
 }  // namespace
@@ -139,6 +139,10 @@ Result<std::string> hash_of_pack(const std::filesystem::path& /*path*/) {
 
 std::optional<std::uint32_t> turned_block_state(const VoxelProperties&, std::uint32_t, const AxisOrientation&) {
   return std::nullopt;
+}
+
+Result<std::vector<std::byte>> write_builtin_pack(std::span<const std::string> /*blocks*/) {
+  return packs_left_out("write");
 }
 
 #else
@@ -188,6 +192,10 @@ Result<std::string> hash_of_pack(const std::filesystem::path& path) {
   std::array<char, kDigits> digits{};
   for (int i = 0; i < kDigits; ++i) digits[i] = "0123456789abcdef"[*hash >> 4 * (kDigits - 1 - i) & 0xFU];
   return std::string(digits.begin(), digits.end());
+}
+
+Result<std::vector<std::byte>> write_builtin_pack(std::span<const std::string> blocks) {
+  return packs::OwnPack::instance()->zip(blocks);
 }
 
 #endif

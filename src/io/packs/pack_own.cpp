@@ -12,10 +12,14 @@
 #include <quoin/core/assert.h>
 #include <quoin/grid/texture.h>
 
+#include "core/bytes/bytes.h"
 #include "core/bytes/text.h"
 #include "io/image/image_codecs.h"
 #include "io/minecraft/block_looks.h"
+#include "io/packs/block_models.h"
+#include "io/packs/block_states.h"
 #include "io/packs/patterns/pack_patterns.h"
+#include "io/zip.h"
 
 namespace quoin::packs {
 
@@ -222,6 +226,71 @@ Result<std::optional<std::vector<std::byte>>> OwnPack::read(std::string_view pat
                       std::string(path));
   }
   return bytes;
+}
+
+namespace {
+
+constexpr std::size_t kMaxZipFiles = 65'535;
+
+/// Adds the files of a block by path: the block states, their models, and the textures that these name.
+Status add_files(const OwnPack& pack, ModelReader& models, const ResourceName& block,
+                 std::map<std::string, std::vector<std::byte>>& files) {
+  // Blocks of mods may name textures that no recipe draws.
+  const auto add = [&](const std::string& path) -> Status {
+    if (files.contains(path)) return {};
+    auto bytes = pack.read(path, kMaxImageBytes);
+    if (!bytes) return bytes.error();
+    if (*bytes) files.emplace(path, std::move(**bytes));
+    return {};
+  };
+  const std::string path = "assets/" + block.space + "/blockstates/" + block.path + ".json";
+  if (auto done = add(path); !done) return done;
+  const auto states = parse_block_states(nlohmann::json::parse(text_of(files[path])));
+  if (!states) return states.error();
+  for (const StateCase& each : states->cases) {
+    for (const StateModel& shown : each.models) {
+      const auto name = resource_name(shown.model);
+      const auto model = models.model(shown.model);
+      if (!model) return model.error();
+      if (!name || *model == nullptr) {
+        return make_error(ErrorCode::InvalidArgument, to_string(block) + " has no model " + shown.model);
+      }
+      if (auto done = add("assets/" + name->space + "/models/" + name->path + ".json"); !done) return done;
+      for (const auto& [variable, text] : (*model)->textures) {
+        const auto texture = (*model)->texture(text);
+        if (!texture) continue;
+        auto done = add("assets/" + texture->space + "/textures/" + texture->path + ".png");
+        if (!done) return done;
+      }
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::vector<std::byte>> OwnPack::zip(std::span<const std::string> blocks) const {
+  std::map<std::string, std::vector<std::byte>> files;
+  // Format 46 is that of version 1.21.4; later versions read it with a warning.
+  files["pack.mcmeta"] = bytes_of(R"({"pack": {"pack_format": 46, "description": "The block pack of Quoin"}})");
+  ModelReader models(*this);
+  for (const std::string& block : blocks) {
+    const auto name = resource_name(block);
+    if (!name) {
+      return make_error(ErrorCode::InvalidArgument,
+                        "\"" + printable(block.substr(0, 100)) + "\" is not the name of a block");
+    }
+    if (auto done = add_files(*this, models, *name, files); !done) return done.error();
+    if (files.size() > kMaxZipFiles) {
+      return make_error(ErrorCode::LimitExceeded, "the pack has more than " + std::to_string(kMaxZipFiles) + " files");
+    }
+  }
+  ZipFile zip;
+  for (const auto& [path, bytes] : files) {
+    zip.begin(path);
+    zip.put(text_of(bytes));
+  }
+  return zip.take();
 }
 
 }  // namespace quoin::packs

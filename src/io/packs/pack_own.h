@@ -2,6 +2,8 @@
 
 #include <memory>
 #include <optional>
+#include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -60,6 +62,9 @@ class OwnPack final : public PackFiles {
   [[nodiscard]] Result<std::optional<std::vector<std::byte>>> read(std::string_view path,
                                                                    std::size_t max_bytes) const override;
   [[nodiscard]] std::string identity() const override { return "builtin"; }
+  /// Returns a zip file with the block states of these blocks, their models and textures, and pack.mcmeta. The bytes
+  /// are the same every time. Errors: as write_builtin_pack.
+  [[nodiscard]] Result<std::vector<std::byte>> zip(std::span<const std::string> blocks) const;
 
  private:
   BlockFamilies families_;

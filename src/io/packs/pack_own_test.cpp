@@ -11,10 +11,13 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <quoin/grid/texture.h>
+#include <quoin/io/block_packs.h>
 #include <quoin/io/image_files.h>
 
 #include "io/minecraft/block_looks.h"
+#include "io/minecraft/block_types.h"
 #include "io/packs/families.h"
+#include "io/packs/pack_looks.h"
 #include "io/packs/patterns/pack_patterns.h"
 
 namespace quoin::packs {
@@ -151,6 +154,66 @@ TEST(BlockFamilies, MovesDefaultPartsIntoTextures) {
   EXPECT_EQ(outside["east"]["uv"], Json::parse("[1.0, 2.0, 3.0, 4.0]"));
   const Json large = faces_of("-16 0 8 32 16 8 ns:all");
   EXPECT_EQ(large["north"]["uv"], Json::parse("[0.0, 0.0, 16.0, 16.0]"));
+}
+
+const std::vector<std::string> kSomeBlocks = {"oak_stairs", "minecraft:stone", "water",
+                                              "oak_fence",  "grass_block",     "redstone_wire",
+                                              "mod:thing",  "white_sign",      "air"};
+
+/// Returns types of some blocks: each by its name, with the states that its own look depends on.
+std::vector<VoxelProperties> types_of_some_blocks() {
+  minecraft::BlockTypes types;
+  for (const std::string& name : kSomeBlocks) {
+    const std::string full = name.find(':') == std::string::npos ? "minecraft:" + name : name;
+    const auto block = types.block(full, {{"facing", "north"}, {"half", "top"}, {"shape", "straight"}});
+    EXPECT_TRUE(block && (block->tint == minecraft::Tint::None || types.tinted(*block, {}))) << name;
+  }
+  const VoxelRegistry registry = types.types();
+  std::vector<VoxelProperties> all;
+  for (std::size_t i = 1; i < registry.size(); ++i) all.push_back(registry[static_cast<VoxelType>(i)]);
+  return all;
+}
+
+TEST(OwnPack, WrittenPackGivesTheSameLooks) {
+  const auto zip = write_builtin_pack(kSomeBlocks);
+  ASSERT_TRUE(zip) << zip.error().message;
+  const auto written = open_pack(*zip);
+  ASSERT_TRUE(written) << written.error().message;
+  EXPECT_TRUE((*written)->read("pack.mcmeta", kMaxJsonBytes)->has_value());
+  BlockLooks of_written(*written);
+  BlockLooks of_own(std::make_shared<MemoryPack>(), OwnPack::instance());
+  const std::vector<VoxelProperties> types = types_of_some_blocks();
+  EXPECT_EQ(types.size(), kSomeBlocks.size() - 1);  // without air
+  for (const VoxelProperties& type : types) {
+    const VoxelProperties made = of_written.applied(type);
+    EXPECT_TRUE(made == of_own.applied(type)) << type.name;
+    EXPECT_FALSE(made.faces.empty() && made.shapes.empty()) << type.name;
+  }
+  EXPECT_EQ(of_written.report().missing_textures, 0U);
+  // The pack has only the blocks that were named.
+  EXPECT_FALSE((*written)->read("assets/minecraft/blockstates/dirt.json", kMaxJsonBytes)->has_value());
+}
+
+TEST(OwnPack, WritesTheSameBytesForAnyOrder) {
+  std::vector<std::string> names = kSomeBlocks;
+  const auto first = write_builtin_pack(names);
+  std::ranges::reverse(names);
+  names.push_back(names.front());
+  const auto second = write_builtin_pack(names);
+  ASSERT_TRUE(first && second);
+  EXPECT_TRUE(*first == *second);
+  EXPECT_TRUE(
+      open_pack(write_builtin_pack(std::vector<std::string>()).value_or(std::vector<std::byte>())).error().code ==
+      ErrorCode::InvalidArgument);  // no block, no folder `assets`
+}
+
+TEST(OwnPack, WritesNoPackForInvalidNames) {
+  for (const std::string name : {"", "a b", "..", "../x", "a:b:c", "oak_log[axis=y]", "x\ny"}) {
+    const auto zip = write_builtin_pack(std::vector{name});
+    ASSERT_FALSE(zip) << name;
+    EXPECT_EQ(zip.error().code, ErrorCode::InvalidArgument);
+    EXPECT_NE(zip.error().message.find("is not the name of a block"), std::string::npos);
+  }
 }
 
 TEST(OwnPack, StairsTurnWithTheirProperties) {
