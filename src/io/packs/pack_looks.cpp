@@ -294,7 +294,9 @@ class BlockLooks::Maker {
     auto shapes = VoxelShapes::from_rules(std::move(rules));
     if (!shapes) return std::nullopt;
     VoxelProperties made = type_;
-    made.faces = VoxelFaces(side, top, top);
+    VoxelFace bottom = top;
+    bottom.turn = 0;
+    made.faces = VoxelFaces(side, top, bottom);
     made.shapes = std::move(*shapes);
     settle(made);
     return made;
