@@ -66,25 +66,33 @@ export async function closeBrowser() {
   launched = undefined;
 }
 
-/** Calls use(page) with the viewer showing the models (paths of GLB files), then closes the page; `truth` is a .vox
- *  file that the page may ask for. */
-export async function withViewer(models, size, use, truth) {
+/** Calls use(page) with a page of a server, then closes the page. */
+export async function withPage(server, path, size, use) {
   const { chromium, launcher } = await requirements();
-  const server = await serve((path) => {
-    const model = /^\/model\/(\d+)\.glb$/.exec(path);
-    return model ? models[Number(model[1])] : path === '/truth.vox' && truth ? truth : join(here, path);
-  });
   const browser = await browserFor(launcher, chromium);
   const page = await browser.newPage({ viewport: { width: size[0], height: size[1] } });
   try {
     page.on('pageerror', (error) => console.error(`page: ${error}`));
     page.on('console', (message) => message.type() === 'error' && console.error(`page: ${message.text()}`));
-    await page.goto(`http://127.0.0.1:${server.address().port}/viewer.html`);
-    await page.waitForFunction(() => window.viewer !== undefined);
-    await page.evaluate((urls) => window.viewer.load(urls), models.map((_, index) => `/model/${index}.glb`));
+    await page.goto(`http://127.0.0.1:${server.address().port}${path}`);
     return await use(page);
   } finally {
     await page.close();
     server.close();
   }
+}
+
+/** Calls use(page) with the viewer showing the models (paths of GLB files), then closes the page; `truth` is a .vox
+ *  file that the page may ask for. */
+export async function withViewer(models, size, use, truth) {
+  await requirements();
+  const server = await serve((path) => {
+    const model = /^\/model\/(\d+)\.glb$/.exec(path);
+    return model ? models[Number(model[1])] : path === '/truth.vox' && truth ? truth : join(here, path);
+  });
+  return withPage(server, '/viewer.html', size, async (page) => {
+    await page.waitForFunction(() => window.viewer !== undefined);
+    await page.evaluate((urls) => window.viewer.load(urls), models.map((_, index) => `/model/${index}.glb`));
+    return use(page);
+  });
 }

@@ -22,44 +22,20 @@
 #include "io/packs/block_states.h"
 #include "io/packs/pack_looks.h"
 #include "io/packs/pack_own.h"
+#include "tests/minecraft_data_for_tests.h"
 
 namespace quoin::packs {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
-using Values = std::map<std::string, std::string>;
-
-// The version of the goal, and a later one whose blocks the rules were not written for.
-constexpr std::array<const char*, 2> kVersions = {"1.21.4", "26.1"};
-
-constexpr const char* kInstall = "needs 500 MB: npm install --prefix build/oracle minecraft-data@3.119.0";
-
-fs::path data_folder(const std::string& version = kVersions[0]) {
-  return fs::path(QUOIN_SOURCE_DIR) / "build/oracle/node_modules/minecraft-data/minecraft-data/data/pc" / version;
-}
-
-Json parsed(const fs::path& file) {
-  std::ifstream in(file);
-  return Json::parse(in);
-}
-
-/// The number of values of a property, and the value of a number. Booleans begin with true.
-std::string value_of(const Json& property, int number) {
-  if (property.contains("values")) return property["values"][static_cast<std::size_t>(number)].get<std::string>();
-  return number == 0 ? "true" : "false";
-}
-
-Values values_of(const Json& block, int state) {
-  Values values;
-  const Json& properties = block["states"];
-  for (auto at = properties.rbegin(); at != properties.rend(); ++at) {
-    const int count = (*at)["num_values"].get<int>();
-    values[(*at)["name"].get<std::string>()] = value_of(*at, state % count);
-    state /= count;
-  }
-  return values;
-}
+using minecraft_data::data_folder;
+using minecraft_data::Json;
+using minecraft_data::kInstall;
+using minecraft_data::kVersions;
+using minecraft_data::parsed;
+using minecraft_data::state_count;
+using minecraft_data::Values;
+using minecraft_data::values_of;
 
 bool holds(const StateCase& each, const Values& values) {
   return std::ranges::any_of(each.when, [&](const std::vector<StateTerm>& terms) {
@@ -222,7 +198,7 @@ TEST(OwnPackOracle, AllStatesHaveElements) {
     std::size_t states = 0;
     for (const Json& block : parsed(data_folder(version) / "blocks.json")) {
       const auto name = block["name"].get<std::string>();
-      const int count = block["maxStateId"].get<int>() - block["minStateId"].get<int>() + 1;
+      const int count = state_count(block);
       for (int state = 0; state < count; ++state) {
         std::size_t elements = 0;
         for (const StateModel& each : reader.models(name, values_of(block, state), problems)) {
@@ -246,7 +222,7 @@ TEST(OwnPackOracle, AllTypesHaveLooks) {
   minecraft::BlockTypes types;
   for (const Json& block : parsed(data_folder() / "blocks.json")) {
     const auto name = "minecraft:" + block["name"].get<std::string>();
-    const int count = block["maxStateId"].get<int>() - block["minStateId"].get<int>() + 1;
+    const int count = state_count(block);
     for (int state = 0; state < count; ++state) {
       const Values values = values_of(block, state);
       const auto made = types.block(name, {values.begin(), values.end()});
@@ -354,7 +330,7 @@ TEST(OwnPackOracle, ShapesFollowCollisionBoxesInAllStates) {
   std::map<std::string, std::string> better_turned;
   for (const Json& block : parsed(data_folder() / "blocks.json")) {
     const auto name = block["name"].get<std::string>();
-    const int count = block["maxStateId"].get<int>() - block["minStateId"].get<int>() + 1;
+    const int count = state_count(block);
     std::map<std::string, Sixteenths> known;
     for (int state = 0; state < count; ++state) {
       const Sixteenths expected = collision(shapes, block, state);
