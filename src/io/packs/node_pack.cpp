@@ -208,7 +208,7 @@ StateOrientations node_orientations(std::string_view turn) {
 
 std::optional<std::uint32_t> turned_node_state(const VoxelProperties& type, std::uint32_t state,
                                                const AxisOrientation& turn) {
-  const BlockFamilies::Traits traits = NodePack::families().traits(pack_name(type.name));
+  const BlockFamilies::Traits traits = NodePack::families().traits(split_resource_name(type.name));
   const bool is_upright = turn.apply(Direction::PosY) == Direction::PosY;
   if (traits.turn.empty()) return is_upright || traits.is_full ? std::optional(state) : std::nullopt;
   const StateOrientations orientations = node_orientations(traits.turn);
