@@ -41,10 +41,11 @@ struct Texture::Content {
   bool is_measured = false;                   // the members above are set
   BlockVector<Rgba8> texels;                  // of all levels, level 0 first
   std::atomic<const Rgba8*> ready = nullptr;  // `texels`, once they are complete
-  std::mutex mutex;                           // guards `decode` and its result
+  mutable std::mutex mutex;                   // guards `decode` and its result
   std::function<AlphaImage()> decode;         // of a deferred texture without texels
 
   void fill(const AlphaImage& image, bool keeps_texels);
+  [[nodiscard]] AlphaImage decoded() const;
   [[nodiscard]] const Rgba8* all_texels() const;
 };
 
@@ -153,15 +154,19 @@ void Texture::Content::fill(const AlphaImage& image, bool keeps_texels) {
   hash = hash_of(name, image.rgba);
 }
 
+AlphaImage Texture::Content::decoded() const {
+  AlphaImage image = decode();
+  QUOIN_ASSERT(image.width == size && fault_of(image).empty(), "the image that was decoded before");
+  return image;
+}
+
 const Rgba8* Texture::Content::all_texels() const {
   if (const Rgba8* const made = ready.load(std::memory_order_acquire)) [[likely]]
     return made;
   auto& self = const_cast<Content&>(*this);  // NOLINT: texels are a cache
   const std::scoped_lock lock(self.mutex);
   if (const Rgba8* const made = ready.load(std::memory_order_acquire)) return made;
-  const AlphaImage image = self.decode();
-  QUOIN_ASSERT(image.width == size && fault_of(image).empty(), "the image that was decoded before");
-  self.fill(image, true);
+  self.fill(decoded(), true);
   self.decode = nullptr;
   self.ready.store(texels.data(), std::memory_order_release);
   return texels.data();
@@ -207,6 +212,18 @@ std::span<const Rgba8> Texture::level(int level) const {
   QUOIN_ASSERT(level >= 0 && level < level_count(), "a level of the texture");
   const std::size_t* const begin = content_->level_begin.data() + level;
   return {content_->all_texels() + begin[0], begin[1] - begin[0]};
+}
+
+AlphaImage Texture::image() const {
+  QUOIN_ASSERT(content_ != nullptr, "a texture that is not null");
+  if (!has_texels()) {
+    const std::scoped_lock lock(content_->mutex);
+    if (!has_texels()) return content_->decoded();
+  }
+  const std::span<const Rgba8> texels = level(0);
+  AlphaImage made{size(), size(), std::vector<std::uint8_t>(texels.size() * sizeof(Rgba8))};
+  std::memcpy(made.rgba.data(), texels.data(), made.rgba.size());
+  return made;
 }
 
 bool Texture::is_opaque() const {

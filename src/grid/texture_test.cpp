@@ -73,11 +73,17 @@ TEST(DeferredTexture, MakesTexelsWhenTheyAreFirstRead) {
   EXPECT_FALSE(texture.has_texels());
   EXPECT_TRUE(eager.has_texels());
   EXPECT_EQ(decoded, 0);
+  EXPECT_EQ(texture.image().rgba, image.rgba);
+  EXPECT_EQ(decoded, 1);
+  EXPECT_FALSE(texture.has_texels()) << "files do not keep texels";
+  decoded = 0;
   parallel_for(64, {8}, [&](std::size_t i) {
     const int level = static_cast<int>(i) % 7;
     EXPECT_TRUE(std::ranges::equal(texture.level(level), eager.level(level)));
   });
   EXPECT_EQ(decoded, 1) << "by one of the threads";
+  EXPECT_EQ(texture.image().rgba, image.rgba);
+  EXPECT_EQ(decoded, 1) << "from its texels";
   EXPECT_TRUE(texture.has_texels());
   EXPECT_EQ(texture, eager);
 }

@@ -472,7 +472,12 @@ namespace {
 
 /// Returns the texels of a texture, multiplied by a tint in linear light, 0 to 1.
 std::vector<Rgba8> tinted(const Texture& texture, const Vec3& tint) {
-  std::vector<Rgba8> texels(texture.level(0).begin(), texture.level(0).end());
+  const AlphaImage image = texture.image();
+  std::vector<Rgba8> texels;
+  texels.reserve(image.rgba.size() / 4);
+  for (std::size_t i = 0; i < image.rgba.size(); i += 4) {
+    texels.push_back({image.rgba[i], image.rgba[i + 1], image.rgba[i + 2], image.rgba[i + 3]});
+  }
   if (tint == Vec3(1.0F)) return texels;
   for (Rgba8& texel : texels) {
     const std::uint8_t alpha = texel.a;

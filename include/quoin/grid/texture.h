@@ -69,8 +69,8 @@ class Texture {
   /// Cost:   O(texels), about 50 ns each.
   [[nodiscard]] static Result<Texture> from_image(std::string name, const AlphaImage& image);
   /// Makes a texture that keeps no texels until they are first read, for worlds with more textures than an image shows.
-  /// `decode` must return the same image again. Any thread calls it once, at the first call of `level`, and then
-  /// releases it. Errors and cost: as from_image, at both times.
+  /// `decode` must return the same image again. Any thread calls it, one at a time: for `image`, and for the first call
+  /// to `level`, after which it is released. Errors and cost: as from_image, at both times.
   [[nodiscard]] static Result<Texture> deferred(std::string name, const AlphaImage& image,
                                                 std::function<AlphaImage()> decode);
 
@@ -86,6 +86,8 @@ class Texture {
   /// Returns the texels of a level, which has size >> level texels per side. The first call for a deferred texture
   /// makes the texels of all levels; errors: bad_alloc. Requires: 0 <= level < level_count().
   [[nodiscard]] std::span<const Rgba8> level(int level) const;
+  /// Returns level 0 as an image, for files. Does not keep the texels of a deferred texture.
+  [[nodiscard]] AlphaImage image() const;
   /// Returns true if all texels have an alpha of 255.
   [[nodiscard]] bool is_opaque() const;
   /// Returns the mean colour in linear light, weighted by alpha; the unweighted mean if all texels are invisible.

@@ -241,11 +241,7 @@ std::vector<std::byte> packed_array(const MaterialPalette& palette, const GltfMe
 
 PngImage png_of(const Texture& texture) {
   const auto size = static_cast<std::uint32_t>(texture.size());
-  PngImage made{size, size, 4, {}};
-  made.pixels.reserve(4 * texture.level(0).size());
-  for (const Rgba8 texel : texture.level(0))
-    made.pixels.insert(made.pixels.end(), {texel.r, texel.g, texel.b, texel.a});
-  return made;
+  return {size, size, 4, texture.image().rgba};
 }
 
 Status add_image(GltfImageKind kind, std::string name, const PngImage& image, GltfLayout& layout) {

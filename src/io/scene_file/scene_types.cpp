@@ -43,11 +43,11 @@ OrderedJson PartWriter::json_of(const Texture& texture, std::size_t index) {
   if (same != last) return {{"type", same->second.type}, {"texture", same->second.index}};
   written_.emplace(texture.hash(), WrittenTexture{texture, types_, index});
   const std::size_t channels = texture.is_opaque() ? 3 : 4;
+  const AlphaImage image = texture.image();
   std::vector<std::byte> bytes;
-  bytes.reserve(channels * texture.level(0).size());
-  for (const Rgba8 texel : texture.level(0)) {
-    const std::array<std::uint8_t, 4> values = {texel.r, texel.g, texel.b, texel.a};
-    for (std::size_t i = 0; i < channels; ++i) bytes.push_back(std::byte{values[i]});
+  bytes.reserve(channels * image.rgba.size() / 4);
+  for (std::size_t i = 0; i < image.rgba.size(); ++i) {
+    if (i % 4 < channels) bytes.push_back(std::byte{image.rgba[i]});
   }
   return {{"name", text(texture.name())}, {"size", texture.size()}, {"texels", to_base64(bytes)}};
 }
