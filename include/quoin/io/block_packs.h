@@ -75,9 +75,10 @@ struct BlockPackReport {
 /// Threads:  any number may call `apply` at once.
 class BlockPacks {
  public:
-  /// Opens packs: folders, zip files or .jar files; folders of Luanti games, mods or texture packs. kBuiltinPack, at any place, gives a look to the blocks that the
-  /// other packs do not have. Errors: CannotRead, BadFormat; InvalidArgument if a pack has no folder `assets`;
-  /// Unsupported in builds without worlds of games; LimitExceeded above 2 GiB.
+  /// Opens packs: folders, zip files or .jar files; folders of Luanti games, mods or texture packs. kBuiltinPack, at
+  /// any place, gives a look to the blocks and nodes that the other packs do not have. Errors: CannotRead, BadFormat;
+  /// InvalidArgument if a pack has no folder `assets`; Unsupported in builds without worlds of games; LimitExceeded
+  /// above 2 GiB.
   [[nodiscard]] static Result<std::shared_ptr<BlockPacks>> open(std::span<const std::filesystem::path> paths);
   /// As above, from the bytes of zip files.
   [[nodiscard]] static Result<std::shared_ptr<BlockPacks>> open(std::vector<std::vector<std::byte>> zips);
