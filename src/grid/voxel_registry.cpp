@@ -144,6 +144,12 @@ std::string error_of_shapes(const VoxelProperties& p) {
   return {};
 }
 
+// See VoxelRegistry::fluid_groups.
+std::uint32_t fluid_groups_of(const VoxelProperties& p) {
+  if (p.shapes.empty() || p.shapes.rules().neighbours != ShapeNeighbours::Fluid) return 0;
+  return p.shapes.rules().groups;
+}
+
 // As ==, but NaN equals itself. Otherwise each lookup would add a type.
 bool is_same(const VoxelProperties& a, const VoxelProperties& b) {
   if (a == b) return true;
@@ -270,6 +276,7 @@ VoxelRegistry::VoxelRegistry() : journal_(std::make_unique<Journal>()) {
     content->visibility.push_back(Visibility::Air);
     content->occlusion.push_back(Visibility::Air);
     content->serials.push_back(0);
+    content->fluid_groups.push_back(0);
     return content;
   }();
   content_ = air_only;
@@ -308,6 +315,7 @@ Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   make_room(c.visibility);
   make_room(c.occlusion);
   make_room(c.properties);
+  make_room(c.fluid_groups);
   c.share_textures(properties.faces);
   c.by_hash.emplace(hash_of(properties), type);
   c.serials.push_back(0);
@@ -320,11 +328,33 @@ Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   if (!properties.faces.empty()) ++c.textured_count;
   if (is_shaped) ++c.shaped_count;
   if (is_turned) ++c.turned_count;
+  c.fluid_groups.push_back(fluid_groups_of(properties));
+  if (c.fluid_groups.back() != 0) ++c.fluid_count;
+  if (c.fluid_groups.back() != 0) c.find_first_fluids();
   c.properties.push_back(std::move(properties));
   if (visibility == Visibility::Transparent) ++c.transparent_count;
   if (occlusion != visibility) ++c.unoccluding_count;
   note({type, occlusion != Visibility::Opaque, true, is_shaped || is_turned});
   return type;
+}
+
+void VoxelRegistry::Content::find_first_fluids() noexcept {
+  first_fluid_of.fill(kAir);
+  for (std::size_t type = fluid_groups.size(); type-- > 1;) {
+    for (std::uint32_t left = fluid_groups[type]; left != 0; left &= left - 1) {
+      first_fluid_of[static_cast<std::size_t>(std::countr_zero(left))] = static_cast<VoxelType>(type);
+    }
+  }
+}
+
+VoxelType VoxelRegistry::first_fluid(std::uint32_t groups) const {
+  if (!has_fluids()) return kAir;
+  VoxelType first = kAir;
+  for (; groups != 0; groups &= groups - 1) {
+    const VoxelType each = content_->first_fluid_of[static_cast<std::size_t>(std::countr_zero(groups))];
+    if (each != kAir && (first == kAir || each < first)) first = each;
+  }
+  return first;
 }
 
 std::optional<VoxelType> VoxelRegistry::find(std::string_view name) const {
@@ -392,6 +422,11 @@ void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
   const bool is_coloured_otherwise =
       !(c.properties[type].colour == properties.colour && c.properties[type].faces == properties.faces &&
         c.properties[type].field_textures == properties.field_textures);
+  const std::uint32_t groups = fluid_groups_of(properties);
+  if (const std::uint32_t had = std::exchange(c.fluid_groups[type], groups); had != groups) {
+    c.fluid_count += std::size_t{groups != 0} - std::size_t{had != 0};
+    c.find_first_fluids();
+  }
   const TypeChange change{type, is_seen_otherwise, is_coloured_otherwise, is_formed_otherwise};
   c.properties[type] = std::move(properties);
   note(change);

@@ -240,12 +240,19 @@ bool Surfaces::update(const VoxelRegistry& types) {
     put(static_cast<VoxelType>(type), types[static_cast<VoxelType>(type)]);
   }
   for (const TypeChange& change : changes->items_unless_all()) put(change.type, types[change.type]);
-  const auto has = [&](CellContent content) {
-    return std::ranges::any_of(faces_, [&](const auto& each) { return each != nullptr && each->content == content; });
-  };
+  fluids_.resize(types.has_fluids() ? types.size() : 0);
+  for (std::size_t type = 0; type < fluids_.size(); ++type) {
+    fluids_[type] = types.first_fluid(types.fluid_groups(static_cast<VoxelType>(type)));
+  }
   has_textures_ = types.has_textures();
-  has_textured_glass_ = has(CellContent::TexturedGlass);
-  has_cells_of_faces_ = has(CellContent::Faces);
+  has_textured_glass_ = has_cells_of_faces_ = false;
+  for (std::size_t type = 0; type < faces_.size(); ++type) {
+    if (faces_[type] == nullptr) continue;
+    const CellContent content = faces_[type]->content;
+    has_textured_glass_ |= content == CellContent::TexturedGlass;
+    // Types with shapes are never such cells.
+    has_cells_of_faces_ |= content == CellContent::Faces && !types.is_shaped(static_cast<VoxelType>(type));
+  }
   changes.commit();
   return true;
 }

@@ -184,6 +184,13 @@ class Surfaces {
   [[nodiscard]] bool is_opaque(VoxelType type) const {
     return type + std::size_t{1} >= surfaces_.size() || is_opaque_[type] != 0;
   }
+  /// Returns true if voxels of both types are one body of glass: equal types, or fluids of one kind
+  /// (VoxelRegistry::joins). A ray keeps the look of the type that it enters.
+  [[nodiscard]] bool joins(VoxelType a, VoxelType b) const {
+    return a == b || (fluid(a) != kAir && fluid(a) == fluid(b));
+  }
+  /// Returns the first registered fluid of the kind of a type; kAir for other types.
+  [[nodiscard]] VoxelType fluid(VoxelType type) const { return type < fluids_.size() ? fluids_[type] : kAir; }
   /// Returns the surface of a field's material. kAir has no material and is white, as in smooth meshes.
   [[nodiscard]] const Surface& of_field(VoxelType material) const;
   /// Returns the colour, emission, roughness and metalness at a point of a field's surface: the weighted mean of the
@@ -210,6 +217,7 @@ class Surfaces {
   bool has_textured_glass_ = false;
   bool has_cells_of_faces_ = false;
   std::vector<Vec3> shape_means_;  // empty without shapes
+  std::vector<VoxelType> fluids_;  // see `fluid`; empty without fluids
 };
 
 /// The way of a ray through a cell, or through a block of cells of one type.

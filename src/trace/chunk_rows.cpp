@@ -88,6 +88,33 @@ Slab ChunkRows::read(int y, int z, SlabRows& rows) const {
   return slab_of(rows);
 }
 
+Slab ListedChunkRows::read(int y, int z, SlabRows& rows) const {
+  const Slab kind = rows_->read(y, z, rows);
+  if (kind == (join_ == Join::Both ? Slab::Empty : Slab::Full)) return kind;
+  if (kind != Slab::Mixed) rows.fill(kind == Slab::Full ? kAll : 0);
+  for (int i = 0; i < 16; ++i) {
+    const std::uint64_t listed = listed_[static_cast<std::size_t>(y + (i & 3) + kChunkEdge * (z + (i >> 2)))];
+    std::uint64_t& row = rows[static_cast<std::size_t>(i)];
+    row = join_ == Join::Both ? row & listed : row | listed;
+  }
+  return slab_of(rows);
+}
+
+void find_uniform_blocks(const Chunk& chunk, const VoxelRegistry& types, std::span<const std::uint64_t> listed,
+                         UniformBlocks& blocks) {
+  constexpr int kCell = 64;
+  blocks = {};
+  for (const VoxelType type : chunk.types()) {
+    if (!types.is_transparent(type) || chunk.count(type) < kCell) continue;
+    const ChunkRows rows(chunk, type);
+    const bool is_whole =
+        types.is_shaped(type)
+            ? add_uniform(ListedChunkRows(rows, listed, ListedChunkRows::Join::Both), kAll, blocks) == kAll
+            : add_uniform(rows, kAll, blocks) == kAll;
+    blocks.is_whole |= is_whole;
+  }
+}
+
 void find_uniform_blocks(const Chunk& chunk, const VoxelRegistry& types, const ChunkSlabs& wanted,
                          UniformBlocks& blocks) {
   constexpr int kCell = 64;

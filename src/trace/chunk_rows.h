@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <quoin/core/assert.h>
@@ -93,6 +94,25 @@ void ChunkRows::for_each_row(const IBox& box, Visit&& visit) const {
   }
 }
 
+/// Rows of a chunk, joined with listed rows, or only their common voxels. `listed`: rows along x, by y + 64 z.
+class ListedChunkRows {
+ public:
+  enum class Join : std::uint8_t { Either, Both };
+  ListedChunkRows(const ChunkRows& rows, std::span<const std::uint64_t> listed, Join join)
+      : rows_(&rows), listed_(listed), join_(join) {
+    QUOIN_ASSERT(listed.size() == std::size_t{kChunkEdge} * kChunkEdge, "a row for each y and z");
+  }
+
+  [[nodiscard]] bool none() const { return rows_->none() && join_ == Join::Both; }
+  /// As ChunkRows::read.
+  [[nodiscard]] Slab read(int y, int z, SlabRows& rows) const;
+
+ private:
+  const ChunkRows* rows_;
+  std::span<const std::uint64_t> listed_;
+  Join join_;
+};
+
 /// The box of the counted voxels, computed row by row.
 class RowsBox {
  public:
@@ -149,6 +169,11 @@ class RowsBox {
 /// a `wanted` slab; other rows of `blocks` stay unchanged. Cost: for each transparent type with enough voxels to fill a
 /// cell, about the cost of building a tree node.
 void find_uniform_blocks(const Chunk& chunk, const VoxelRegistry& types, const ChunkSlabs& wanted,
+                         UniformBlocks& blocks);
+
+/// Finds the blocks of all of a chunk that are full of one transparent type, of a type with shapes only those of listed
+/// voxels. Cost: as above, for all rows.
+void find_uniform_blocks(const Chunk& chunk, const VoxelRegistry& types, std::span<const std::uint64_t> listed,
                          UniformBlocks& blocks);
 
 /// Four adjacent bricks along x, at (y, z) of a chunk, multiples of 16.

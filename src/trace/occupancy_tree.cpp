@@ -443,6 +443,17 @@ struct OccupancyTree::Impl {
     }
     return changed;
   }
+  // As above, also with the listed voxels of types with shapes (OccupancyTree::CubesOfChunk).
+  std::uint64_t put(const Chunk* voxels, const VoxelRegistry& types, IVec3 chunk,
+                    std::span<const std::uint64_t> cubes) {
+    if (voxels == nullptr || cubes.empty()) return put(voxels, types, chunk);
+    const trace::ChunkRows rows(*voxels, types, which);
+    using Rows = trace::ListedChunkRows;
+    const std::uint64_t changed = put(Rows(rows, cubes, Rows::Join::Either), chunk);
+    set_uniform_blocks(
+        chunk, [&](trace::UniformBlocks& blocks) { trace::find_uniform_blocks(*voxels, types, cubes, blocks); });
+    return changed;
+  }
   // Returns the wanted slabs that contain voxels, and all wanted slabs in rows with changed bricks. The uniform
   // blocks of other slabs cannot have changed.
   static ChunkSlabs with_any(const ChunkNode& node, std::uint64_t changed, const ChunkSlabs& wanted) {
@@ -796,6 +807,17 @@ void OccupancyTree::update(const DensityGrid& field, const VoxelRegistry& types,
   std::vector<ChunkBricks> changed;
   for (const SlabsOfChunk& each : cells_reached(changes)) {
     changed.push_back({each.chunk, impl_->put_glass(field, types, each.chunk)});
+  }
+  finish_update(changed);
+}
+
+void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, std::span<const IVec3> chunks,
+                           const CubesOfChunk& cubes_in) {
+  QUOIN_ASSERT(impl_ != nullptr && impl_->which == Occupancy::Glass, "a tree of glass that was not moved from");
+  std::vector<ChunkBricks> changed;
+  changed.reserve(chunks.size());
+  for (const IVec3 chunk : chunks) {
+    changed.push_back({chunk, impl_->put(grid.find_chunk(chunk), types, chunk, cubes_in(chunk))});
   }
   finish_update(changed);
 }

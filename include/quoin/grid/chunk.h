@@ -224,6 +224,16 @@ struct Neighbourhood {
 /// Requires: -63 <= local.x, local.y, local.z < 127.
 [[nodiscard]] const ShapeModel* shape_at(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 local);
 
+/// The fluid next to the shape of a voxel (ShapeRules::fluid).
+struct InnerFluid {
+  std::uint32_t groups = 0;           ///< 0: there is none
+  VoxelType type = kAir;              ///< the type that shows it; kAir: no fluid of these groups is registered
+  const ShapeModel* model = nullptr;  ///< the fluid's shape; null if `type` is kAir
+};
+
+/// Returns the fluid next to the shape of a voxel. Lifetime and requirements: as `shape_at`.
+[[nodiscard]] InnerFluid fluid_at(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 local);
+
 /// Returns a neighbourhood of a chunk without neighbours, with the origin 0. Lifetime: same as Neighbourhood.
 [[nodiscard]] inline Neighbourhood isolated(const Chunk& chunk) {
   Neighbourhood n;

@@ -338,5 +338,7 @@ class GridWriter {
 /// Returns the shape of a voxel, as its state and its neighbours select it; null if its type has no shapes. Lifetime:
 /// until the type is replaced. Cost: a few lookups.
 [[nodiscard]] const ShapeModel* shape_at(const Grid& grid, const VoxelRegistry& types, IVec3 voxel);
+/// Returns the fluid next to the shape of a voxel. Lifetime and cost: as `shape_at`.
+[[nodiscard]] InnerFluid fluid_at(const Grid& grid, const VoxelRegistry& types, IVec3 voxel);
 
 }  // namespace quoin

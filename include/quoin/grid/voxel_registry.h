@@ -298,6 +298,19 @@ class VoxelRegistry {
   [[nodiscard]] bool is_shaped(VoxelType type) const {
     return has_shapes() && type < size() && !content_->properties[type].shapes.empty();
   }
+  /// Returns the groups of a fluid (ShapeNeighbours::Fluid); 0 for other types.
+  [[nodiscard]] std::uint32_t fluid_groups(VoxelType type) const {
+    return has_fluids() && type < size() ? content_->fluid_groups[type] : 0;
+  }
+  /// Returns true if both types are one type, or fluids with a common group: they hide their common faces.
+  [[nodiscard]] bool joins(VoxelType a, VoxelType b) const {
+    return a == b || (fluid_groups(a) & fluid_groups(b)) != 0;
+  }
+  /// Returns the first registered fluid with any of these groups; kAir if there is none. Cost: O(groups), O(1) without
+  /// fluids.
+  [[nodiscard]] VoxelType first_fluid(std::uint32_t groups) const;
+  /// Returns true if any registered type is a fluid.
+  [[nodiscard]] bool has_fluids() const { return content_->fluid_count > 0; }
   /// Returns true if any registered type has shapes.
   [[nodiscard]] bool has_shapes() const { return content_->shaped_count > 0; }
   /// Returns true if the state of a type turns it (VoxelProperties::orientations).
@@ -329,6 +342,9 @@ class VoxelRegistry {
     std::size_t textured_count = 0;
     std::size_t shaped_count = 0;
     std::size_t turned_count = 0;  // types that their state turns
+    std::size_t fluid_count = 0;
+    std::vector<std::uint32_t> fluid_groups;     // by type; see `fluid_groups`
+    std::array<VoxelType, 32> first_fluid_of{};  // by the bit of a group; kAir: there is none
 
     struct SharedTexture {
       Texture texture;
@@ -336,6 +352,8 @@ class VoxelRegistry {
     };
     std::multimap<std::uint64_t, SharedTexture> textures;  // of all types, each once, by hash
 
+    // Finds `first_fluid_of` after the fluids have changed.
+    [[gnu::visibility("hidden")]] void find_first_fluids() noexcept;
     // Makes a type's faces use the texels of equal textures of other types. If it throws, some texels are kept longer.
     [[gnu::visibility("hidden")]] void share_textures(VoxelFaces& faces);
     [[gnu::visibility("hidden")]] void release_textures(const VoxelFaces& faces) noexcept;

@@ -209,8 +209,23 @@ enum class ShapeNeighbours : std::uint8_t {
   /// turned by a quarter, they form a corner (StairCorner).
   Stairs,
   /// Fluids: the surface is inclined towards lower neighbours. The three lowest bits of the state are the level: 0 is a
-  /// source, 1 to 7 are lower; bit 3 means that the fluid falls and fills its voxel. `parts` are not used.
+  /// source, 1 to 7 are lower; bit 3 means that the fluid falls and fills its voxel. `parts` are not used. Fluids of
+  /// different types with a common group (ShapeRules::groups) are one: their heights join, and they hide their common
+  /// faces.
   Fluid,
+};
+
+/// A fluid in the rest of a voxel that has a shape: the water around a fence. It is a source, with the surface that a
+/// fluid of its groups has there. Rays and meshes show it with the type of a fluid next to the voxel, else of the first
+/// registered one (VoxelRegistry::first_fluid). Bodies and queries do not meet it.
+struct ContainedFluid {
+  std::uint32_t groups = 0;  ///< as ShapeRules::groups of the fluid
+  /// Present if any of them holds; empty: always. They depend on the state only.
+  std::vector<ShapeCondition> when{};
+
+  bool operator==(const ContainedFluid&) const = default;
+  /// Returns true if a voxel with this state contains the fluid.
+  [[nodiscard]] bool is_present(std::uint32_t state) const;
 };
 
 /// The shapes of a voxel type, selected by state, neighbours and position. All parts whose conditions hold are present
@@ -220,6 +235,7 @@ struct ShapeRules {
   ShapeNeighbours neighbours = ShapeNeighbours::None;
   std::uint32_t groups = 1;            ///< a bit per group; neighbours connect if they have one in common
   bool connects_to_full_sides = true;  ///< for ShapeNeighbours::Connected
+  std::optional<ContainedFluid> fluid{};
 
   bool operator==(const ShapeRules&) const = default;
 };
@@ -314,6 +330,10 @@ struct ShapeModel {
   [[nodiscard]] bool empty() const { return faces.empty() && boxes.empty(); }
 };
 
+/// Returns true if a model is exactly the cube of its type: one box that fills the voxel, with the type's faces. Cost:
+/// for most models one comparison.
+[[nodiscard]] bool is_cube(const ShapeModel& model, const VoxelFaces& type_faces);
+
 /// Returns the look of a face of a model, or null if the face has the type's colour. A look without a texture has the
 /// colour of its tint. `type_faces`: VoxelProperties::faces of the voxel's type.
 [[nodiscard]] const VoxelFace* look_of(const ShapeModel& model, const ModelFace& face, const VoxelFaces& type_faces);
@@ -335,8 +355,9 @@ class VoxelShapes {
   ///
   /// Errors: InvalidArgument if there are no or more than kMaxShapeParts parts (except for fluids), a part has no
   ///         shape, all parts together have more than 4 * kMaxShapeElements elements, a share of positions is empty or
-  ///         not within its count, there are more than kMaxPositionShares of them, or their counts have no common multiple
-  ///         up to kMaxPositionCount.
+  ///         not within its count, there are more than kMaxPositionShares of them, their counts have no common multiple
+  ///         up to kMaxPositionCount, or `fluid` has no group, is in a fluid, or has a condition of neighbours or
+  ///         positions.
   [[nodiscard]] static Result<VoxelShapes> from_rules(ShapeRules rules);
 
   [[nodiscard]] bool empty() const { return content_ == nullptr; }

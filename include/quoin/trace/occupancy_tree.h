@@ -26,7 +26,7 @@ enum class Occupancy : std::uint8_t {
   NonAir,       ///< all voxels that a ray can hit
   Opaque,       ///< voxels that block light
   Transparent,  ///< voxels that tint light
-  Glass,        ///< the transparent voxels whose type has no shapes (VoxelRegistry::is_shaped)
+  Glass,        ///< the transparent voxels whose type has no shapes (VoxelRegistry::is_shaped), or that are listed
 };
 
 /// The ray-traversal structure: a bit per occupied voxel of a grid, at every level of detail.
@@ -92,6 +92,11 @@ class OccupancyTree {
   // Builds a tree of the voxels that `rows` lists in some chunks.
   [[nodiscard, gnu::visibility("hidden")]] static OccupancyTree build(std::span<const IVec3> chunks,
                                                                       const RowsOfVoxels& rows);
+  // Replaces all voxels of some chunks of a tree of glass: cubes of glass types, and the voxels of shaped types that
+  // `cubes_in(chunk)` lists, as rows along x by y + 64 z; no rows: none.
+  using CubesOfChunk = FunctionRef<std::span<const std::uint64_t>(IVec3 chunk)>;
+  [[gnu::visibility("hidden")]] void update(const Grid& grid, const VoxelRegistry& types, std::span<const IVec3> chunks,
+                                            const CubesOfChunk& cubes_in);
   // Replaces all voxels of some chunks of such a tree.
   [[gnu::visibility("hidden")]] void update(std::span<const IVec3> chunks, const RowsOfVoxels& rows);
   [[nodiscard]] const Impl& impl() const;

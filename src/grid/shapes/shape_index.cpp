@@ -49,13 +49,22 @@ class SurroundingsFinder {
         around.corner = corner(voxel, rules, orientation);
         break;
       case ShapeNeighbours::Fluid:
-        around.heights = heights(voxel, type);
+        around.heights = heights(voxel, rules.groups);
         break;
     }
     if (const std::uint32_t count = properties.shapes.position_count(); count > 1) {
       around.position = static_cast<std::uint16_t>(position_number(voxels_.origin() + voxel) % count);
     }
     return &properties.shapes.model(state, orientation, around);
+  }
+
+  [[nodiscard]] InnerFluid fluid(IVec3 voxel, VoxelType type) const {
+    const std::uint32_t groups = contained_groups(voxel, type);
+    if (groups == 0) return {};
+    InnerFluid inner{groups, fluid_type_near(voxel, groups), nullptr};
+    if (inner.type == kAir) return inner;
+    inner.model = &types_[inner.type].shapes.model(0, {}, {.heights = heights(voxel, groups)});
+    return inner;
   }
 
  private:
@@ -117,11 +126,37 @@ class SurroundingsFinder {
     return StairCorner::Straight;
   }
 
+  // Returns the groups of the fluid in a voxel next to a shape (ShapeRules::fluid); 0: there is none.
+  [[nodiscard]] std::uint32_t contained_groups(IVec3 voxel, VoxelType type) const {
+    if (!types_.is_shaped(type)) return 0;
+    const VoxelProperties& properties = types_[type];
+    const std::optional<ContainedFluid>& fluid = properties.shapes.rules().fluid;
+    if (!fluid) return 0;
+    const bool is_present = fluid->is_present(properties.state_bits == 0 ? 0 : voxels_.state(voxel));
+    return is_present ? fluid->groups : 0;
+  }
+  [[nodiscard]] bool holds_fluid(IVec3 voxel, std::uint32_t groups) const {
+    const VoxelType type = voxels_.get(voxel);
+    return ((types_.fluid_groups(type) | contained_groups(voxel, type)) & groups) != 0;
+  }
+  // Returns the type of a fluid above, next to or below a voxel, else the first one of all.
+  [[nodiscard]] VoxelType fluid_type_near(IVec3 voxel, std::uint32_t groups) const {
+    constexpr std::array<Direction, 6> kOrder = {Direction::PosY, Direction::PosX, Direction::NegX,
+                                                 Direction::PosZ, Direction::NegZ, Direction::NegY};
+    for (const Direction direction : kOrder) {
+      const VoxelType type = voxels_.get(voxel + normal_of(direction));
+      if ((types_.fluid_groups(type) & groups) != 0) return type;
+    }
+    return types_.first_fluid(groups);
+  }
+
   // Returns the height of a fluid in a voxel in ninths, or nullopt for other voxels. 9: the fluid fills its voxel.
-  [[nodiscard]] std::optional<int> ninths(IVec3 voxel, VoxelType fluid) const {
-    if (voxels_.get(voxel) != fluid) return std::nullopt;
-    if (voxels_.get(voxel + IVec3(0, 1, 0)) == fluid) return 9;
-    const std::uint32_t state = types_[fluid].state_bits == 0 ? 0 : voxels_.state(voxel);
+  [[nodiscard]] std::optional<int> ninths(IVec3 voxel, std::uint32_t groups) const {
+    const VoxelType type = voxels_.get(voxel);
+    const bool is_fluid = (types_.fluid_groups(type) & groups) != 0;
+    if (!is_fluid && (contained_groups(voxel, type) & groups) == 0) return std::nullopt;
+    if (holds_fluid(voxel + IVec3(0, 1, 0), groups)) return 9;
+    const std::uint32_t state = !is_fluid || types_[type].state_bits == 0 ? 0 : voxels_.state(voxel);
     return (state & 8U) != 0 ? 9 : 8 - static_cast<int>(state & 7U);
   }
 
@@ -129,12 +164,12 @@ class SurroundingsFinder {
   static constexpr int kOpen = 0;
   static constexpr int kSolid = -1;
 
-  [[nodiscard]] std::array<std::uint8_t, 4> heights(IVec3 voxel, VoxelType fluid) const {
-    if (ninths(voxel, fluid) == 9) return {16, 16, 16, 16};
+  [[nodiscard]] std::array<std::uint8_t, 4> heights(IVec3 voxel, std::uint32_t groups) const {
+    if (ninths(voxel, groups) == 9) return {16, 16, 16, 16};
     std::array<int, 9> columns{};  // (x, z) - 1 from the voxel: x + 3 z
     for (std::size_t i = 0; i < 9; ++i) {
       const IVec3 at = voxel + IVec3(static_cast<int>(i % 3) - 1, 0, static_cast<int>(i / 3) - 1);
-      columns[i] = ninths(at, fluid).value_or(types_.is_opaque(voxels_.get(at)) ? kSolid : kOpen);
+      columns[i] = ninths(at, groups).value_or(types_.is_opaque(voxels_.get(at)) ? kSolid : kOpen);
     }
     return {height_at({columns[0], columns[1], columns[3], columns[4]}),
             height_at({columns[1], columns[2], columns[4], columns[5]}),
@@ -208,6 +243,16 @@ const ShapeModel* shape_at(const Neighbourhood& chunks, const VoxelRegistry& typ
 const ShapeModel* shape_at(const Grid& grid, const VoxelRegistry& types, IVec3 voxel) {
   const GridVoxels voxels{grid};
   return SurroundingsFinder(voxels, types).model(voxel, grid.get(voxel));
+}
+
+InnerFluid fluid_at(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 local) {
+  const NearVoxels voxels{chunks};
+  return SurroundingsFinder(voxels, types).fluid(local, chunks.get(local));
+}
+
+InnerFluid fluid_at(const Grid& grid, const VoxelRegistry& types, IVec3 voxel) {
+  const GridVoxels voxels{grid};
+  return SurroundingsFinder(voxels, types).fluid(voxel, grid.get(voxel));
 }
 
 NearPlanes::NearPlanes(const Neighbourhood& chunks)
@@ -293,9 +338,9 @@ bool covers(const VoxelRegistry& types, VoxelType neighbour, const ShapeModel* n
   if (neighbour_model == nullptr) return types.is_opaque(neighbour);
   const VoxelProperties& properties = types[neighbour];
   if (properties.visibility != Visibility::Opaque) {
-    if (neighbour != type) return false;
+    if (!types.joins(neighbour, type)) return false;
     // Both fluids have the same heights at their common corners.
-    if (properties.shapes.rules().neighbours == ShapeNeighbours::Fluid) return true;
+    if (types.fluid_groups(neighbour) != 0) return true;
   }
   const SideMask& side = neighbour_model->sides[static_cast<std::size_t>(opposite(direction))];
   for (std::size_t i = 0; i < mask.size(); ++i) {
@@ -312,22 +357,33 @@ class ShapeIndex::Lists {
   // Adds the shape of a voxel of the chunk, in any order. `touched`: the voxels of the chunk that it touches.
   void add(IVec3 local, VoxelType type, const ShapeModel& model, const IBox& touched) {
     const bool is_inside = kWholeChunk.contains(local);
-    if (is_inside) put(local, list_of_one({{}, type, &model}));
+    if (is_inside) put(local, list_of_one({{}, type, &model, false}));
     if (is_inside && touched == IBox{local, local + 1}) return;
     for (int z = touched.min.z; z < touched.max.z; ++z) {
       for (int y = touched.min.y; y < touched.max.y; ++y) {
         for (int x = touched.min.x; x < touched.max.x; ++x) {
           const IVec3 at{x, y, z};
-          if (at != local) others_.push_back({number_of(at), {offset_of(local - at), type, &model}});
+          if (at != local) others_.push_back({number_of(at), {offset_of(local - at), type, &model, false}});
         }
       }
     }
   }
 
+  // Adds the fluid of a voxel of the chunk, next to its shape.
+  void add(IVec3 local, const InnerFluid& fluid) {
+    if (kWholeChunk.contains(local)) others_.push_back({number_of(local), {{}, fluid.type, fluid.model, true}});
+  }
+  // Adds a voxel of the chunk that is a cube.
+  void add_cube(IVec3 local) {
+    if (cubes_.empty()) cubes_.resize(std::size_t{kChunkEdge} * kChunkEdge);
+    cubes_[number_of(local) / kChunkEdge] |= std::uint64_t{1} << local.x;
+  }
+
   // Writes the lists. Returns false if there are none.
   bool finish(IVec3 origin) {
     add_others();
-    if (used_ == 0) return false;
+    out_.cubes = std::move(cubes_);
+    if (used_ == 0) return !out_.cubes.empty();
     for (std::uint64_t left = used_; left != 0; left &= left - 1) {
       pack_brick(static_cast<std::size_t>(std::countr_zero(left)));
     }
@@ -349,9 +405,10 @@ class ShapeIndex::Lists {
     std::array<std::int8_t, 3> offset{};
     VoxelType type = kAir;
     const ShapeModel* model = nullptr;
+    bool is_inner = false;  // a fluid next to the voxel's own shape
 
-    // By the order of lists: z, y, x; then by anything, to find equal lists.
-    [[nodiscard]] auto order() const { return std::tuple(offset[2], offset[1], offset[0], type, model); }
+    // By the order of lists: the own one, z, y, x; then by anything, to find equal lists.
+    [[nodiscard]] auto order() const { return std::tuple(!is_inner, offset[2], offset[1], offset[0], type, model); }
     bool operator<(const Entry& other) const { return order() < other.order(); }
   };
   struct Touch {
@@ -391,7 +448,7 @@ class ShapeIndex::Lists {
       list.clear();
       if (!numbers_.empty() && numbers_[cell] != 0) {
         const ListedShape& own = out_.shapes[numbers_[cell] - 1];
-        list.push_back({{}, own.type, own.model});
+        list.push_back({{}, own.type, own.model, false});
       }
       for (; i < others_.size() && others_[i].cell == cell; ++i) list.push_back(others_[i].entry);
       const auto [found, is_new] = several_.try_emplace(list, 0);
@@ -408,6 +465,7 @@ class ShapeIndex::Lists {
       shape.offset = entry.offset;
       shape.type = entry.type;
       shape.is_opaque = types_[entry.type].visibility == Visibility::Opaque;
+      shape.is_inner = entry.is_inner;
       shape.model = entry.model;
       shape.first_box = boxes_of(*entry.model);
       shape.box_count = static_cast<std::uint32_t>(entry.model->boxes.size());
@@ -460,6 +518,7 @@ class ShapeIndex::Lists {
 
   const VoxelRegistry& types_;
   ChunkShapes& out_;
+  std::vector<std::uint64_t> cubes_;      // rows along x, by y + 64 z; empty: none
   std::vector<std::uint32_t> numbers_;    // 1 + the first shape of each voxel's list; 0: none
   std::uint64_t used_ = 0;                // bricks
   std::array<std::uint64_t, 3> masks_{};  // touched coordinates by axis
@@ -484,7 +543,14 @@ std::shared_ptr<const ShapeIndex::ChunkShapes> ShapeIndex::made(const Grid& grid
   std::array<VoxelType, kChunkEdge> row;
   const auto add = [&](IVec3 local, VoxelType type) {
     const ShapeModel& model = *finder.model(local, type);
+    const Types::Kind kind = types.kinds[type];
+    if (kind == Types::Kind::Glass && quoin::is_cube(model, types.registry[type].faces)) {
+      if (kWholeChunk.contains(local)) lists.add_cube(local);
+      return;
+    }
     lists.add(local, type, model, intersect({local + model.cells.min, local + model.cells.max}, kWholeChunk));
+    if (kind != Types::Kind::HoldsFluid) return;
+    if (const InnerFluid fluid = finder.fluid(local, type); fluid.model != nullptr) lists.add(local, fluid);
   };
   // Shapes of neighbouring chunks matter only within one voxel of this chunk.
   for (int z = -1; z <= kChunkEdge; ++z) {
@@ -500,7 +566,7 @@ std::shared_ptr<const ShapeIndex::ChunkShapes> ShapeIndex::made(const Grid& grid
         const int end = dx > 0 ? 1 : kChunkEdge;
         for (int x = begin; x < end; ++x) {
           const VoxelType type = row[static_cast<std::size_t>(x)];
-          if (type < types.is_shaped.size() && types.is_shaped[type] != 0) add(first + IVec3(x, 0, 0), type);
+          if (type < types.kinds.size() && types.kinds[type] != Types::Kind::Cube) add(first + IVec3(x, 0, 0), type);
         }
       }
     }
@@ -508,10 +574,16 @@ std::shared_ptr<const ShapeIndex::ChunkShapes> ShapeIndex::made(const Grid& grid
   return lists.finish(chunk * kChunkEdge) ? result : nullptr;
 }
 
-ShapeIndex::Types::Types(const VoxelRegistry& types)
-    : registry(types), is_shaped(types.has_shapes() ? types.size() : 0) {
-  for (std::size_t type = 0; type < is_shaped.size(); ++type) {
-    is_shaped[type] = types.is_shaped(static_cast<VoxelType>(type)) ? 1 : 0;
+ShapeIndex::Types::Types(const VoxelRegistry& types) : registry(types), kinds(types.has_shapes() ? types.size() : 0) {
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    const auto type = static_cast<VoxelType>(i);
+    if (!types.is_shaped(type)) continue;
+    const VoxelProperties& properties = types[type];
+    const bool is_glass = properties.visibility == Visibility::Transparent &&
+                          (properties.faces.empty() || std::ranges::all_of(kDirections, [&](Direction direction) {
+                             return properties.faces[direction].alpha == FaceAlpha::Translucent;
+                           }));
+    kinds[i] = properties.shapes.rules().fluid ? Kind::HoldsFluid : is_glass ? Kind::Glass : Kind::Shaped;
   }
 }
 
@@ -553,7 +625,7 @@ std::vector<IVec3> ShapeIndex::update(const Grid& grid, const VoxelRegistry& typ
   }
   // No voxel has a new type except within the changes.
   Types next(types);
-  if (next.is_shaped.empty()) {
+  if (next.kinds.empty()) {
     types_ = std::move(next);
     return {};
   }
@@ -592,6 +664,18 @@ std::uint64_t ShapeIndex::touched_row(IVec3 voxel) const {
   return found == chunks_.end() ? 0 : found->second->row(voxel);
 }
 
+std::span<const std::uint64_t> ShapeIndex::cubes_in(IVec3 chunk) const {
+  const auto found = chunks_.find(chunk);
+  return found == chunks_.end() ? std::span<const std::uint64_t>() : std::span(found->second->cubes);
+}
+
+bool ShapeIndex::is_cube(IVec3 voxel) const {
+  const std::span<const std::uint64_t> rows = cubes_in(chunk_of(voxel));
+  if (rows.empty()) return false;
+  const IVec3 local = local_of(voxel);
+  return (rows[number_of(local) / kChunkEdge] >> local.x & 1U) != 0;
+}
+
 IBox ShapeIndex::bounds() const {
   IBox bounds;
   for (const auto& [chunk, shapes] : chunks_) bounds = unite(bounds, shapes->bounds);
@@ -603,7 +687,7 @@ std::size_t ShapeIndex::bytes() const {
   for (const auto& [chunk, shapes] : chunks_) {
     bytes += sizeof(ChunkShapes) + shapes->blocks.capacity() * sizeof(ChunkShapes::Block) +
              shapes->cells.capacity() * sizeof(std::uint32_t) + shapes->shapes.capacity() * sizeof(ListedShape) +
-             shapes->boxes.capacity() * sizeof(ListedBox);
+             shapes->boxes.capacity() * sizeof(ListedBox) + shapes->cubes.capacity() * sizeof(std::uint64_t);
   }
   return bytes;
 }

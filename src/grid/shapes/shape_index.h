@@ -102,6 +102,7 @@ struct ListedShape {
   std::uint8_t count = 1;               // of the first shape of a list: how many shapes the list has
   VoxelType type = kAir;
   bool is_opaque = false;  // its material
+  bool is_inner = false;   // the fluid next to the own shape: bodies and queries do not meet it
   std::uint32_t first_box = 0;
   std::uint32_t box_count = 0;
   const ShapeModel* model = nullptr;
@@ -110,8 +111,8 @@ struct ListedShape {
   [[nodiscard]] bool is_own() const { return (offset[0] | offset[1] | offset[2]) == 0; }
 };
 
-// The shapes that touch a voxel: its own first, then in the order of their voxels (z, y, x). Lifetime: until the next
-// update of the index.
+// The shapes that touch a voxel: its own first, then a fluid next to it (ListedShape::is_inner), then in the order of
+// their voxels (z, y, x). Lifetime: until the next update of the index.
 class ShapesAtVoxel {
  public:
   class Iterator {
@@ -174,6 +175,9 @@ class ShapesAtVoxel {
 
 // The shaped voxels of a grid, by the voxels that they touch: a shape may reach outside its own voxel. Chunks without
 // shapes take no memory; a copy shares all chunks with the original until either is updated.
+//
+// Voxels of glass whose shape is exactly the cube of their type (`is_cube` of voxel_shape.h), such as water below
+// water, are not listed, since rays find the same in them as in a cube. They are rows of bits, for trees of cubes.
 class ShapeIndex {
   struct ChunkShapes;
 
@@ -210,7 +214,7 @@ class ShapeIndex {
                             const DataChanges& data);
 
   [[nodiscard]] bool empty() const { return chunks_.empty(); }
-  // Returns the chunks with voxels that shapes touch, by z, y, x.
+  // Returns the chunks with voxels that shapes touch, or whose shapes are cubes, by z, y, x.
   [[nodiscard]] std::vector<IVec3> chunks() const;
   // Returns the shapes that touch a voxel, its own first, then in the order of their voxels (z, y, x). Lifetime: until
   // the next update. Cost: one hash lookup.
@@ -218,7 +222,11 @@ class ShapeIndex {
   [[nodiscard]] bool touches(IVec3 voxel) const { return !at(voxel).empty(); }
   // Returns the row of 64 voxels along x that contains a voxel: bit i is set if shapes touch voxel i of the row.
   [[nodiscard]] std::uint64_t touched_row(IVec3 voxel) const;
-  // Calls `visit(const PlacedShape&)` once for each shaped voxel of a chunk, by z, y, x.
+  // Returns the shaped voxels of a chunk that are cubes of glass: rows along x as bits, by y + 64 z; no rows if there
+  // are none. Lifetime: until the next update.
+  [[nodiscard]] std::span<const std::uint64_t> cubes_in(IVec3 chunk) const;
+  [[nodiscard]] bool is_cube(IVec3 voxel) const;
+  // Calls `visit(const PlacedShape&)` once for each listed voxel of a chunk, by z, y, x: for its own shape.
   template <class Visit>
   void for_each_in(IVec3 chunk, Visit&& visit) const {
     const auto found = chunks_.find(chunk);
@@ -259,7 +267,8 @@ class ShapeIndex {
     std::vector<std::uint32_t> cells;
     std::vector<ListedShape> shapes;
     std::vector<ListedBox> boxes;
-    IBox bounds;  // voxels of the grid
+    IBox bounds;                       // voxels of the grid
+    std::vector<std::uint64_t> cubes;  // see `cubes_in`
 
     // `voxel`: of the grid, in this chunk.
     [[nodiscard]] ShapesAtVoxel at(IVec3 voxel) const {
@@ -296,8 +305,10 @@ class ShapeIndex {
 
   using Chunks = std::unordered_map<IVec3, std::shared_ptr<const ChunkShapes>, CoordinateHash>;
   struct Types {
+    // Cube: without shapes. Glass: may be a cube by its shape.
+    enum class Kind : std::uint8_t { Cube, Shaped, Glass, HoldsFluid };
     VoxelRegistry registry;  // keeps the models
-    std::vector<std::uint8_t> is_shaped;
+    std::vector<Kind> kinds;
 
     Types() = default;
     explicit Types(const VoxelRegistry& types);

@@ -446,6 +446,29 @@ class ModelBuilder {
 
 }  // namespace
 
+bool is_cube(const ShapeModel& model, const VoxelFaces& type_faces) {
+  if (!model.is_full || model.boxes.size() != 1 || model.faces.size() != 6) return false;
+  if (model.min != Vec3(0.0F) || model.max != Vec3(1.0F)) return false;
+  return std::ranges::all_of(model.faces, [&](const ModelFace& face) {
+    const VoxelFace* const look = look_of(model, face, type_faces);
+    if (type_faces.empty()) return look == nullptr;
+    const VoxelFace& of_cube = type_faces[face.direction];
+    if (look == nullptr || !(*look == of_cube)) return false;
+    const TextureFrame frame = texture_frame(of_cube, face.direction);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const std::array<float, 2> uv{along(frame.right, face.corners[i]), along(frame.down, face.corners[i])};
+      if (texture_uv(face, *look, face.uv[i]) != uv) return false;
+    }
+    return true;
+  });
+}
+
+bool ContainedFluid::is_present(std::uint32_t state) const {
+  return when.empty() || std::ranges::any_of(when, [&](const ShapeCondition& condition) {
+           return ((state ^ condition.state) & condition.state_mask) == 0;
+         });
+}
+
 const VoxelFace* look_of(const ShapeModel& model, const ModelFace& face, const VoxelFaces& type_faces) {
   if (face.look >= 6) return &model.looks[face.look - std::size_t{6}];
   return type_faces.empty() ? nullptr : &type_faces[static_cast<Direction>(face.look)];
@@ -511,7 +534,8 @@ struct VoxelShapes::Content {
   };
 
   ShapeRules rules;
-  std::uint32_t state_mask = 0;
+  std::uint32_t state_mask = 0;  // bits that select parts
+  std::uint32_t fluid_mask = 0;  // bits that select `rules.fluid`
   std::uint32_t position_count = 1;
   // By reduced position: the number of its class. All positions of a class belong to the same shares. Empty: one class.
   std::vector<std::uint16_t> class_of_position;
@@ -608,6 +632,7 @@ Result<VoxelShapes> VoxelShapes::from_rules(ShapeRules rules) {
     return make_error(ErrorCode::InvalidArgument, "cannot use the shapes of a type: " + reason);
   };
   if (rules.neighbours > ShapeNeighbours::Fluid) return wrong("unknown use of neighbours");
+  if (rules.neighbours == ShapeNeighbours::Fluid && rules.groups == 0) return wrong("a fluid has no group");
   if (rules.parts.empty() && rules.neighbours != ShapeNeighbours::Fluid) return wrong("there is no part");
   if (rules.parts.size() > kMaxShapeParts) return wrong("more than " + std::to_string(kMaxShapeParts) + " parts");
   auto content = std::make_shared<Content>();
@@ -622,6 +647,17 @@ Result<VoxelShapes> VoxelShapes::from_rules(ShapeRules rules) {
   }
   if (elements > 4 * kMaxShapeElements)
     return wrong("more than " + std::to_string(4 * kMaxShapeElements) + " elements");
+  if (rules.fluid) {
+    if (rules.fluid->groups == 0) return wrong("the fluid that voxels contain has no group");
+    if (rules.neighbours == ShapeNeighbours::Fluid) return wrong("a fluid contains a fluid");
+    for (const ShapeCondition& condition : rules.fluid->when) {
+      if (condition.corner || !condition.connected.empty() || !condition.unconnected.empty()) {
+        return wrong("the fluid that voxels contain depends on neighbours");
+      }
+      if (condition.positions.count != 0) return wrong("the fluid that voxels contain depends on positions");
+      content->fluid_mask |= condition.state_mask;
+    }
+  }
   content->rules = std::move(rules);
   if (const Status added = content->add_positions(); !added) return wrong(added.error().message);
   VoxelShapes shapes;
@@ -636,7 +672,8 @@ const ShapeRules& VoxelShapes::rules() const {
 
 std::uint32_t VoxelShapes::state_mask() const {
   QUOIN_ASSERT(content_ != nullptr, "shapes");
-  return content_->state_mask | (content_->rules.neighbours == ShapeNeighbours::Fluid ? 15U : 0U);
+  return content_->state_mask | content_->fluid_mask |
+         (content_->rules.neighbours == ShapeNeighbours::Fluid ? 15U : 0U);
 }
 
 std::uint32_t VoxelShapes::position_count() const {

@@ -414,6 +414,176 @@ TEST(ShapeAt, FallingFluidsMeetTheirNeighboursAtEqualHeights) {
   EXPECT_EQ(shape_at(grid, types, {1, 0, 0})->max.y, 1.0F);
 }
 
+VoxelProperties fluid_of(const char* name, std::uint32_t groups, std::uint8_t red = 40) {
+  return {.name = name,
+          .colour = {red, 90, 200, 120},
+          .visibility = Visibility::Transparent,
+          .state_bits = 4,
+          .shapes = *VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid, .groups = groups})};
+}
+
+// A slab that contains a fluid if bit 0 of its state is set.
+VoxelProperties wet_slab(std::uint32_t groups) {
+  ShapeRules rules{.parts = {{.shape = slab()}}};
+  rules.fluid = ContainedFluid{.groups = groups, .when = {{.state_mask = 1, .state = 1}}};
+  return {.name = "wet slab", .state_bits = 1, .shapes = *VoxelShapes::from_rules(std::move(rules))};
+}
+
+TEST(ShapeAt, FluidsOfOneKindJoinAndHideTheirFaces) {
+  VoxelRegistry types;
+  const VoxelType lake = *types.add(fluid_of("lake", 6));
+  const VoxelType sea = *types.add(fluid_of("sea", 2, 90));
+  const VoxelType oil = *types.add(fluid_of("oil", 8));
+  Grid grid;
+  grid.set({0, 0, 0}, lake);
+  grid.set({1, 0, 0}, sea);
+  grid.set({2, 0, 0}, oil);
+  const auto at = [&](int x) { return shape_at(grid, types, {x, 0, 0}); };
+  SideMask whole;
+  whole.fill(~std::uint64_t{0});
+  EXPECT_TRUE(covers(types, sea, at(1), lake, Direction::PosX, whole));
+  EXPECT_TRUE(covers(types, lake, at(0), sea, Direction::NegX, whole));
+  EXPECT_FALSE(covers(types, oil, at(2), sea, Direction::PosX, whole));
+  EXPECT_TRUE(types.joins(lake, sea));
+  EXPECT_FALSE(types.joins(oil, sea));
+  grid.set({0, 1, 0}, sea);
+  EXPECT_TRUE(at(0)->is_full) << "below another type of its kind";
+  EXPECT_EQ(at(1)->max.y, 1.0F) << "as high as the full voxel next to it";
+  grid.set({0, 1, 0}, oil);
+  EXPECT_FALSE(at(0)->is_full);
+}
+
+TEST(ShapeAt, RegistryKnowsTheFirstFluidOfEachGroup) {
+  VoxelRegistry types;
+  EXPECT_EQ(types.first_fluid(~0U), kAir);
+  ASSERT_TRUE(types.add({.name = "stone"}));
+  const VoxelType sea = *types.add(fluid_of("sea", 2));
+  const VoxelType both = *types.add(fluid_of("both", 6));
+  EXPECT_EQ(types.first_fluid(2), sea);
+  EXPECT_EQ(types.first_fluid(4), both);
+  EXPECT_EQ(types.first_fluid(6), sea);
+  EXPECT_EQ(types.first_fluid(1), kAir);
+  const VoxelRegistry copy = types;
+  types.replace(sea, {.name = "ice"});
+  EXPECT_EQ(types.first_fluid(2), both);
+  EXPECT_EQ(types.fluid_groups(sea), 0U);
+  EXPECT_EQ(copy.first_fluid(2), sea);
+  types.replace(both, {.name = "ice"});
+  EXPECT_FALSE(types.has_fluids());
+  EXPECT_EQ(types.first_fluid(~0U), kAir);
+}
+
+TEST(ShapeAt, ShapesContainFluids) {
+  VoxelRegistry types;
+  const VoxelType half = *types.add(wet_slab(2));
+  Grid grid;
+  grid.set({0, 0, 0}, half, {.state = 1});
+  EXPECT_EQ(fluid_at(grid, types, {0, 0, 0}).groups, 2U);
+  EXPECT_EQ(fluid_at(grid, types, {0, 0, 0}).type, kAir) << "no fluid is registered";
+  EXPECT_EQ(fluid_at(grid, types, {0, 0, 0}).model, nullptr);
+  const VoxelType sea = *types.add(fluid_of("sea", 2));
+  const VoxelType lake = *types.add(fluid_of("lake", 2, 90));
+  EXPECT_EQ(fluid_at(grid, types, {0, 0, 0}).type, sea) << "the first one";
+  grid.set({1, 0, 0}, lake);
+  const InnerFluid fluid = fluid_at(grid, types, {0, 0, 0});
+  EXPECT_EQ(fluid.type, lake) << "that of its neighbour";
+  ASSERT_NE(fluid.model, nullptr);
+  const auto corner_height = [](const ShapeModel& model, float x) {
+    float highest = 0.0F;
+    for (const ModelFace& face : model.faces) {
+      for (const Vec3& corner : face.corners) highest = corner.x == x ? std::max(highest, corner.y) : highest;
+    }
+    return highest;
+  };
+  const float joined = corner_height(*shape_at(grid, types, {1, 0, 0}), 0.0F);
+  EXPECT_EQ(corner_height(*fluid.model, 1.0F), joined) << "their common corners";
+  grid.set_data({0, 0, 0}, {.state = 0});
+  EXPECT_EQ(fluid_at(grid, types, {0, 0, 0}).groups, 0U);
+  EXPECT_LT(corner_height(*shape_at(grid, types, {1, 0, 0}), 0.0F), joined) << "next to a dry slab";
+  grid.set_data({0, 0, 0}, {.state = 1});
+  grid.set({0, 1, 0}, half, {.state = 1});
+  EXPECT_TRUE(fluid_at(grid, types, {0, 0, 0}).model->is_full) << "below a wet slab";
+  EXPECT_EQ(shape_at(grid, types, {0, 0, 0})->max.y, 0.5F);
+}
+
+TEST(VoxelShape, RejectsFluidsWithoutGroupsAndWithNeighbours) {
+  const auto error_of = [](ShapeRules rules) {
+    const auto made = VoxelShapes::from_rules(std::move(rules));
+    return made ? std::string() : made.error().message;
+  };
+  const std::string start = "cannot use the shapes of a type: ";
+  const auto with = [](ContainedFluid fluid) {
+    ShapeRules rules{.parts = {{.shape = slab()}}};
+    rules.fluid = std::move(fluid);
+    return rules;
+  };
+  EXPECT_EQ(error_of(with({.groups = 2})), "");
+  EXPECT_EQ(error_of(with({})), start + "the fluid that voxels contain has no group");
+  EXPECT_EQ(error_of(with({.groups = 2, .when = {{.connected = {Direction::PosX}}}})),
+            start + "the fluid that voxels contain depends on neighbours");
+  EXPECT_EQ(error_of(with({.groups = 2, .when = {{.corner = StairCorner::Straight}}})),
+            start + "the fluid that voxels contain depends on neighbours");
+  ShapeRules fluid = with({.groups = 2});
+  fluid.neighbours = ShapeNeighbours::Fluid;
+  EXPECT_EQ(error_of(fluid), start + "a fluid contains a fluid");
+  EXPECT_EQ(error_of({.neighbours = ShapeNeighbours::Fluid, .groups = 0}), start + "a fluid has no group");
+  VoxelProperties type = wet_slab(2);
+  type.state_bits = 0;
+  EXPECT_FALSE(validate_type(type)) << "its state does not have the bit";
+}
+
+TEST(ShapeIndex, CubesOfGlassAreNotListed) {
+  VoxelRegistry types;
+  const VoxelType water = *types.add(fluid_of("water", 2));
+  VoxelProperties of_lava = fluid_of("lava", 4);
+  of_lava.visibility = Visibility::Opaque;
+  const VoxelType lava = *types.add(of_lava);
+  const VoxelType glass = *types.add({.name = "glass",
+                                      .colour = {9, 9, 9, 99},
+                                      .visibility = Visibility::Transparent,
+                                      .shapes = VoxelShape::box(IVec3(0), IVec3(16))});
+  ShapeElement tinted;
+  tinted.faces[2].face = VoxelFace{.tint = {1, 2, 3}};
+  const VoxelType other = *types.add(
+      {.name = "tinted glass", .visibility = Visibility::Transparent, .shapes = *VoxelShape::from_elements({tinted})});
+  const VoxelType half = *types.add(wet_slab(2));
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {4, 3, 4}}, water);
+  grid.fill_box({{10, 0, 0}, {14, 3, 4}}, lava);
+  grid.set({20, 0, 0}, glass);
+  grid.set({22, 0, 0}, other);
+  grid.set({1, 0, 1}, half, {.state = 1});
+  ChangeCursor cursor = grid.cursor();
+  ChangeCursor data_cursor = grid.cursor();
+  ShapeIndex index;
+  index.build(grid, types);
+  EXPECT_TRUE(index.is_cube({0, 1, 0}));
+  EXPECT_TRUE(index.at({0, 1, 0}).empty());
+  EXPECT_FALSE(index.is_cube({0, 2, 0})) << "the surface";
+  EXPECT_EQ(index.at({0, 2, 0}).size(), 1U);
+  EXPECT_TRUE(index.is_cube({20, 0, 0}));
+  EXPECT_FALSE(index.is_cube({22, 0, 0})) << "a side with another look";
+  EXPECT_TRUE(index.at({22, 0, 0}).has_own());
+  EXPECT_FALSE(index.is_cube({11, 1, 1})) << "opaque";
+  EXPECT_TRUE(index.at({11, 1, 1}).has_own());
+  const ShapesAtVoxel wet = index.at({1, 0, 1});
+  ASSERT_EQ(wet.size(), 2U);
+  EXPECT_TRUE(wet.has_own());
+  EXPECT_EQ(wet[0].type, half);
+  EXPECT_FALSE(wet.listed()[0].is_inner);
+  EXPECT_EQ(wet[1].type, water);
+  EXPECT_TRUE(wet.listed()[1].is_inner);
+  EXPECT_TRUE(wet[1].model->is_full);
+
+  // The water above is gone, so that a cube becomes a surface; and the slab is dry.
+  grid.set({0, 2, 0}, kAir);
+  grid.set_data({1, 0, 1}, {.state = 0});
+  index.update(grid, types, grid.changes_since(cursor), grid.data_changes_since(data_cursor));
+  EXPECT_FALSE(index.is_cube({0, 1, 0}));
+  EXPECT_TRUE(index.at({0, 1, 0}).has_own());
+  EXPECT_EQ(index.at({1, 0, 1}).size(), 1U);
+}
+
 TEST(ShapeIndex, ListsShapesInVoxelsThatTheyTouchAndFollowsEdits) {
   VoxelRegistry types;
   const VoxelType half = *types.add({.name = "slab", .shapes = slab()});
@@ -491,7 +661,7 @@ TEST(ShapeIndex, FailedUpdateChangesNothing) {
   }
 }
 
-// Lists the shapes that touch a voxel, as ShapeIndex::at does.
+// Lists the shapes that touch a voxel, as ShapeIndex::at does. Those of full water are cubes.
 std::vector<PlacedShape> touching(const Grid& grid, const VoxelRegistry& types, IVec3 at) {
   std::vector<PlacedShape> result;
   for (int i = -1; i < 27; ++i) {
@@ -499,7 +669,12 @@ std::vector<PlacedShape> touching(const Grid& grid, const VoxelRegistry& types, 
     const IVec3 voxel = i < 0 ? at : at + IVec3(i % 3, i / 3 % 3, i / 9) - 1;
     const ShapeModel* const model = shape_at(grid, types, voxel);
     const IVec3 offset = at - voxel;
-    if (model != nullptr && model->cells.contains(offset)) result.push_back({voxel, grid.get(voxel), model});
+    if (model == nullptr || !model->cells.contains(offset)) continue;
+    const VoxelType type = grid.get(voxel);
+    if (types[type].visibility == Visibility::Transparent && model->is_full) continue;
+    result.push_back({voxel, type, model});
+    const InnerFluid fluid = i < 0 ? fluid_at(grid, types, voxel) : InnerFluid{};
+    if (fluid.model != nullptr) result.push_back({voxel, fluid.type, fluid.model});
   }
   return result;
 }
@@ -513,7 +688,8 @@ TEST(ShapeIndex, ListsEqualThoseOfEachVoxel) {
       {.name = "wide", .shapes = *VoxelShape::from_elements({{.min = Vec3(-16, 0, -8), .max = Vec3(24, 24, 32)}})});
   const VoxelType water = add_water(types);
   const VoxelType rubble = *types.add({.name = "rubble", .shapes = shapes_for_tests::rubble()});
-  const std::array<VoxelType, 7> all = {stone, half, post, wide, water, water, rubble};
+  const VoxelType wet = *types.add(wet_slab(1));
+  const std::array<VoxelType, 8> all = {stone, half, post, wide, water, water, rubble, wet};
   std::mt19937 random(5);
   Grid grid;
   for (int i = 0; i < 260; ++i) {
@@ -533,7 +709,9 @@ TEST(ShapeIndex, ListsEqualThoseOfEachVoxel) {
     const ShapesAtVoxel found = reader.at(at);
     ASSERT_EQ(found.size(), wanted.size()) << at.x << ' ' << at.y << ' ' << at.z;
     EXPECT_EQ(found.empty(), wanted.empty());
-    EXPECT_EQ(found.has_own(), types.is_shaped(grid.get(at)));
+    const ShapeModel* const own = shape_at(grid, types, at);
+    EXPECT_EQ(index.is_cube(at), own != nullptr && grid.get(at) == water && own->is_full);
+    EXPECT_EQ(found.has_own(), own != nullptr && !index.is_cube(at));
     EXPECT_EQ((index.touched_row(at) >> (at.x & (kChunkEdge - 1)) & 1U) != 0, !wanted.empty());
     std::size_t i = 0;
     for (const PlacedShape& shape : found) {
@@ -682,7 +860,8 @@ TEST(ShapeIndex, OceanTakesLessThanOneBytePerVoxel) {
   index.build(grid, types);
   EXPECT_LT(static_cast<double>(index.bytes()), 0.6 * kChunkVoxels * 2);
   EXPECT_EQ(index.at({70, 63, 5})[0].model, shape_at(grid, types, {70, 63, 5}));
-  EXPECT_EQ(index.at({70, 62, 5})[0].model, shape_at(grid, types, {70, 62, 5}));
+  EXPECT_TRUE(index.at({70, 62, 5}).empty());
+  EXPECT_TRUE(index.is_cube({70, 62, 5}));
 }
 
 }  // namespace

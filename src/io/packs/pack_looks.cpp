@@ -28,6 +28,9 @@ namespace {
 
 constexpr Rgba8 kWhite{255, 255, 255};
 constexpr std::size_t kMaxNames = 8;  // of a report
+// Groups of fluids (ShapeRules::groups); see `joined_group` for those of other blocks.
+constexpr std::uint32_t kWaterGroup = 1U << 4;
+constexpr std::uint32_t kLavaGroup = 1U << 5;
 
 std::string_view without_space(std::string_view block) {
   const std::size_t colon = block.find(':');
@@ -290,7 +293,7 @@ class BlockLooks::Maker {
       side.texture = layer.look.texture;
       side.alpha = layer.look.alpha;
     }
-    ShapeRules rules{.neighbours = ShapeNeighbours::Fluid, .groups = name_ == "lava" ? 1U << 5 : 1U << 4};
+    ShapeRules rules{.neighbours = ShapeNeighbours::Fluid, .groups = name_ == "lava" ? kLavaGroup : kWaterGroup};
     auto shapes = VoxelShapes::from_rules(std::move(rules));
     if (!shapes) return std::nullopt;
     VoxelProperties made = type_;
@@ -659,12 +662,24 @@ class BlockLooks::Maker {
 
   Result<VoxelProperties> with_shapes(VoxelProperties made, ShapeRules rules,
                                       const std::vector<std::vector<ShapeElement>>& all) const {
+    rules.fluid = contained_water();
     auto shapes = VoxelShapes::from_rules(std::move(rules));
     if (!shapes) return shapes.error();
     made.shapes = std::move(*shapes);
     made.faces = common_faces(all);
     settle(made);
     return made;
+  }
+
+  /// Returns the water around blocks that grow in water, and around waterlogged ones; nullopt for other blocks.
+  [[nodiscard]] std::optional<ContainedFluid> contained_water() const {
+    constexpr std::array<std::string_view, 4> kWaterPlants = {"seagrass", "tall_seagrass", "kelp", "kelp_plant"};
+    if (std::ranges::find(kWaterPlants, name_) != kWaterPlants.end() || states_.is_named("waterlogged", "true")) {
+      return ContainedFluid{.groups = kWaterGroup};
+    }
+    const minecraft::StateField* const field = states_.field("waterlogged");
+    if (field == nullptr || field->kind != 'b') return std::nullopt;
+    return ContainedFluid{.groups = kWaterGroup, .when = {{.state_mask = mask_of(*field), .state = mask_of(*field)}}};
   }
 
   /// Returns a texture per direction, for uses that show a whole voxel: that of the largest face. No faces if there are

@@ -318,6 +318,31 @@ TEST(PackLooks, FluidsHaveHeights) {
   EXPECT_EQ(made.faces[Direction::PosX].tint, (Rgba8{0x3F, 0x76, 0xE4}));
 }
 
+TEST(PackLooks, WaterloggedBlocksContainWater) {
+  PackBuilder pack = small_pack();
+  pack.texture("block/water_still", packs_test::plain_png({200, 200, 200, 180}));
+  add_block(pack, "oak_slab", R"({"elements": [{"from": [0, 0, 0], "to": [16, 8, 16],
+        "faces": {"up": {"texture": "block/red"}, "north": {"texture": "block/red"}}}]})");
+  add_block(pack, "seagrass", R"({"elements": [{"from": [0, 0, 8], "to": [16, 16, 8],
+        "faces": {"north": {"texture": "block/leaf"}, "south": {"texture": "block/leaf"}}}]})");
+  const VoxelProperties water = look(pack, block("minecraft:water", {{"level", "0"}}).type);
+  const auto fluid_of = [&](const TypeAndState& from) -> std::uint32_t {
+    const VoxelProperties made = look(pack, from.type);
+    EXPECT_TRUE(validate_type(made));
+    const ShapeRules& rules = made.shapes.rules();
+    return rules.fluid && rules.fluid->is_present(from.state) ? rules.fluid->groups : 0;
+  };
+  const std::uint32_t groups = water.shapes.rules().groups;
+  EXPECT_EQ(fluid_of(block("minecraft:oak_slab", {{"type", "bottom"}, {"waterlogged", "true"}})), groups);
+  EXPECT_EQ(fluid_of(block("minecraft:oak_slab", {{"type", "bottom"}, {"waterlogged", "false"}})), 0U);
+  EXPECT_EQ(fluid_of(block("minecraft:oak_slab", {{"type", "bottom"}})), 0U);
+  EXPECT_EQ(fluid_of(block("minecraft:seagrass", {})), groups);
+  // Water of another biome is of the same kind, lava is not.
+  EXPECT_NE(groups & look(pack, block("minecraft:bubble_column", {{"drag", "true"}}).type).shapes.rules().groups, 0U);
+  pack.texture("block/lava_still", packs_test::plain_png(kRed));
+  EXPECT_EQ(groups & look(pack, block("minecraft:lava", {{"level", "0"}}).type).shapes.rules().groups, 0U);
+}
+
 TEST(PackLooks, WiresAreColouredByPower) {
   PackBuilder pack = small_pack();
   pack.states("redstone_wire", R"({"multipart": [{"apply": {"model": "block/dot"}}]})");

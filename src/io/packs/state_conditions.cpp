@@ -68,6 +68,10 @@ const minecraft::StateField* TypeStates::field(std::string_view property) const 
   return found == fields_.end() ? nullptr : &*found;
 }
 
+bool TypeStates::is_named(std::string_view property, std::string_view value) const {
+  return std::ranges::any_of(named_, [&](const auto& each) { return each.first == property && each.second == value; });
+}
+
 bool TypeStates::has(std::string_view property) const {
   return field(property) != nullptr ||
          std::ranges::find(named_, property, &std::pair<std::string, std::string>::first) != named_.end();

@@ -39,6 +39,9 @@ class TypeStates {
   /// Returns true if the name or the state has the property.
   [[nodiscard]] bool has(std::string_view property) const;
 
+  /// Returns true if the name has the property with this value.
+  [[nodiscard]] bool is_named(std::string_view property, std::string_view value) const;
+
   /// Chooses a value for each property that the type does not have and whose commonest value no variant has: the
   /// commonest one that a variant has, or the first. Call it before `conditions`, with the variants of the block.
   void choose_absent(const BlockStates& variants);

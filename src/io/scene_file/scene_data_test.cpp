@@ -493,10 +493,12 @@ VoxelProperties shaped_type() {
   ShapePart bar{.shape = *VoxelShape::from_elements({ShapeElement{}, tilted}), .orientation = AxisOrientation::at(29)};
   bar.when = {{.state_mask = 3, .state = 2, .connected = {Direction::NegX, Direction::PosZ}},
               {.unconnected = {Direction::PosY}, .corner = StairCorner::InnerLeft, .positions = {12, 3, 7}}};
-  type.shapes = *VoxelShapes::from_rules({.parts = {{.shape = VoxelShape::box({1, 2, 3}, {4, 5, 6})}, bar},
-                                          .neighbours = ShapeNeighbours::Connected,
-                                          .groups = 0xF000'0001U,
-                                          .connects_to_full_sides = false});
+  ShapeRules rules{.parts = {{.shape = VoxelShape::box({1, 2, 3}, {4, 5, 6})}, bar},
+                   .neighbours = ShapeNeighbours::Connected,
+                   .groups = 0xF000'0001U,
+                   .connects_to_full_sides = false};
+  rules.fluid = ContainedFluid{.groups = 48, .when = {{.state_mask = 16, .state = 16}, {.state_mask = 12}}};
+  type.shapes = *VoxelShapes::from_rules(std::move(rules));
   return type;
 }
 
@@ -558,6 +560,11 @@ TEST(SceneData, RefusesInvalidShapesWithTheirPosition) {
             shapes + ".neighbours: must be one of none, connected, stairs, fluid");
   EXPECT_EQ(error_with("\"groups\":4026531841", "\"groups\":-1"),
             shapes + ".groups: must be a whole number from 0 to 4294967295");
+  EXPECT_EQ(error_with("\"fluid\":{\"groups\":48", "\"fluid\":{\"groups\":0"),
+            shapes + ": cannot use the shapes of a type: the fluid that voxels contain has no group");
+  EXPECT_EQ(error_with("\"fluid\":{\"groups\":48,", "\"fluid\":{"), shapes + ".fluid: \"groups\" is missing");
+  EXPECT_EQ(error_with("\"state_mask\":12", "\"connected\":[\"+X\"]"),
+            shapes + ": cannot use the shapes of a type: the fluid that voxels contain depends on neighbours");
   EXPECT_EQ(error_with("\"orientation\":29", "\"orientation\":48"),
             shapes + ".parts[1].orientation: must be a whole number from 0 to 47");
   EXPECT_EQ(error_with("\"+Z\"", "\"up\""),

@@ -134,6 +134,11 @@ OrderedJson PartWriter::json_of(const VoxelShapes& shapes, TypeTextures& texture
   if (rules.neighbours != ShapeNeighbours::None) json["neighbours"] = name_of(kShapeNeighbours, rules.neighbours);
   if (rules.groups != ShapeRules{}.groups) json["groups"] = rules.groups;
   if (!rules.connects_to_full_sides) json["connects_to_full_sides"] = false;
+  if (rules.fluid) {
+    OrderedJson& fluid = json["fluid"];
+    fluid["groups"] = rules.fluid->groups;
+    for (const ShapeCondition& condition : rules.fluid->when) fluid["when"].push_back(scene_json::json_of(condition));
+  }
   OrderedJson list = OrderedJson::array();
   for (const ShapePart& part : rules.parts) {
     OrderedJson each = OrderedJson::object();
@@ -400,10 +405,20 @@ ShapePart part_of(const Json& json, const Place& place, const std::vector<Textur
   return part;
 }
 
+ContainedFluid contained_fluid_of(const Json& json, const Place& place, Faults& faults) {
+  const Object object(json, place, {"groups", "when"}, faults);
+  ContainedFluid fluid;
+  if (object.need("groups") != nullptr) fluid.groups = bits_in(object, "groups").value_or(0);
+  const auto add = [&](const Json& each, const Place& at) { fluid.when.push_back(condition_of(each, at, faults)); };
+  if (object.find("when") != nullptr) read_list(object, "when", std::numeric_limits<std::size_t>::max(), add);
+  return fluid;
+}
+
 // Reads the shapes of the next type, and appends their textures to `textures`.
 VoxelShapes shapes_of(const Json& json, const Place& place, const TexturesOfTypes& earlier,
                       std::vector<Texture>& textures, Faults& faults) {
-  const Object object(json, place, {"neighbours", "groups", "connects_to_full_sides", "parts", "textures"}, faults);
+  const Object object(json, place, {"neighbours", "groups", "connects_to_full_sides", "fluid", "parts", "textures"},
+                      faults);
   const auto add = [&](const Json& each, const Place& at) {
     textures.push_back(texture_of(each, at, earlier, faults));
   };
@@ -412,6 +427,9 @@ VoxelShapes shapes_of(const Json& json, const Place& place, const TexturesOfType
   read_name(object, "neighbours", kShapeNeighbours, rules.neighbours);
   rules.groups = bits_in(object, "groups").value_or(rules.groups);
   object.read("connects_to_full_sides", rules.connects_to_full_sides);
+  if (const Json* fluid = object.find("fluid")) {
+    rules.fluid = contained_fluid_of(*fluid, object.place_of("fluid"), faults);
+  }
   if (rules.neighbours != ShapeNeighbours::Fluid || object.find("parts") != nullptr) {
     read_list(object, "parts", kMaxShapeParts,
               [&](const Json& each, const Place& at) { rules.parts.push_back(part_of(each, at, textures, faults)); });

@@ -453,14 +453,16 @@ QUOIN_INLINE bool covers_all(const SideMask& squares, const SideMask& mask) {
   return open == 0;
 }
 
-// Writes the visible faces of a shaped voxel.
+// Writes the visible faces of a shaped voxel, or of the fluid next to its shape. `shown`: the voxel or the fluid.
 template <bool kOcclusion>
-QUOIN_INLINE ShapeFace* write_faces(const Job& job, const ShapedVoxel& voxel, ShapeFace* out) {
+QUOIN_INLINE ShapeFace* write_faces(const Job& job, const ShapedVoxel& voxel, const ShapedVoxel& shown,
+                                    ShapeFace* out) {
   constexpr int kPlane = ShapedVoxels::kEdge * ShapedVoxels::kCellStride;
   constexpr int kSteps[6] = {1, -1, ShapedVoxels::kCellStride, -ShapedVoxels::kCellStride, kPlane, -kPlane};
   const std::size_t cell = ShapedVoxels::cell_at(voxel.local);
   const std::uint8_t* const sides = job.shapes->sides.data() + cell;
   unsigned hidden = 1U << PackedFace::kNeverSeen;
+  if (&shown != &voxel) hidden |= sides[0] & ShapedVoxels::kWhole;  // a fluid behind the sides of the shape
   unsigned asked = 0;
   for (unsigned d = 0; d < 6; ++d) {
     const unsigned side = sides[kSteps[d]];
@@ -468,10 +470,10 @@ QUOIN_INLINE ShapeFace* write_faces(const Job& job, const ShapedVoxel& voxel, Sh
     asked |= side / ShapedVoxels::kPartly << d;
   }
   const SideMask* masks[6] = {};
-  if ((asked &= ~hidden) != 0) asked = find_covered_squares(job, voxel, asked, masks);
+  if ((asked &= ~hidden) != 0) asked = find_covered_squares(job, voxel, shown, asked, masks);
   alignas(32) std::uint8_t around[32] = {};
   if constexpr (kOcclusion) gather_around(job.shapes->eighths.data() + cell, around);
-  const ShapeModel& model = *voxel.model;
+  const ShapeModel& model = *shown.model;
   const auto place = static_cast<std::uint32_t>(voxel.local.x | voxel.local.y << 6 | voxel.local.z << 12);
   const PackedFace* const faces = model.packed_faces.data();
   const std::size_t count = model.packed_faces.size();
@@ -482,7 +484,7 @@ QUOIN_INLINE ShapeFace* write_faces(const Job& job, const ShapedVoxel& voxel, Sh
     out->model = &model;
     out->bits = bits;
     out->face = static_cast<std::uint16_t>(i);
-    out->type = voxel.type;
+    out->type = shown.type;
     bool is_seen = (hidden >> face.side & 1U) == 0;
     if ((asked >> face.side & 1U) != 0) is_seen = !covers_all(*masks[face.side], model.faces[i].mask);
     out += is_seen ? 1 : 0;
@@ -491,12 +493,14 @@ QUOIN_INLINE ShapeFace* write_faces(const Job& job, const ShapedVoxel& voxel, Sh
 }
 
 ShapeFace* write_shape_faces(const Job& job, ShapeFace* out) {
-  const ShapedVoxel* voxel = job.shapes->voxels.data();
-  const ShapedVoxel* const end = voxel + job.shapes->voxels.size();
-  for (; voxel != end; ++voxel) {
-    if (!job.region.contains(voxel->local)) continue;
-    out = job.occlusion ? write_faces<true>(job, *voxel, out) : write_faces<false>(job, *voxel, out);
+  const ShapedVoxel* const voxels = job.shapes->voxels.data();
+  const auto write = [&](const ShapedVoxel& voxel, const ShapedVoxel& shown) {
+    out = job.occlusion ? write_faces<true>(job, voxel, shown, out) : write_faces<false>(job, voxel, shown, out);
+  };
+  for (const ShapedVoxel* voxel = voxels; voxel != voxels + job.shapes->voxels.size(); ++voxel) {
+    if (job.region.contains(voxel->local)) write(*voxel, *voxel);
   }
+  for (const InnerShape& inner : job.shapes->inner) write(voxels[inner.holder], inner.shown);
   return out;
 }
 

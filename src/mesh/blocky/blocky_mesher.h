@@ -99,8 +99,16 @@ struct OcclusionTables {
 struct ShapedVoxel {
   IVec3 local{0};  // -1 to 64
   VoxelType type = kAir;
-  bool is_opaque = false;  // its material: it hides and darkens faces
+  bool is_opaque = false;   // its material: it hides and darkens faces
+  bool is_fluid = false;    // the shape is that of a fluid
+  std::uint32_t fluid = 0;  // groups of the fluid in the voxel, also next to another shape (ShapeRules::fluid)
   const ShapeModel* model = nullptr;
+};
+
+// The fluid next to the shape of a voxel, within the region.
+struct InnerShape {
+  std::uint32_t holder = 0;  // index of the voxel in ShapedVoxels::voxels
+  ShapedVoxel shown;         // the fluid
 };
 
 // A question: the occlusion of a face of a voxel.
@@ -126,6 +134,7 @@ struct ShapedVoxels {
   std::size_t listed_count = 0;
   std::uint32_t first[kRows];       // by row_of, of listed rows: the number of voxels before the row
   BlockVector<ShapedVoxel> voxels;  // by z, y, x
+  BlockVector<InnerShape> inner;    // in the order of `voxels`
   // By cell_at, valid within two voxels of shaped ones: the eighths of a voxel that darken corners
   // (ShapeModel::filled_octants), and the sides that it covers wholly, by direction.
   BlockVector<std::uint8_t> eighths;
@@ -147,6 +156,7 @@ struct ShapedVoxels {
     bool has_state = false;
     bool is_turned = false;
     bool uses_position = false;
+    std::uint32_t fluid_groups = 0;  // of fluids
     const ShapeRules* rules = nullptr;
     const ShapeModel* only_model = nullptr;  // if neither state, neighbours nor position matter
   };
@@ -277,7 +287,8 @@ void hide_faces_at_border(const Job& job, Scratch& scratch);
 
 // Finds the squares that shaped neighbours cover of some sides of a shaped voxel: sets `masks`, by direction. Returns
 // the sides with such squares. Both sets of sides are bits.
-unsigned find_covered_squares(const Job& job, const ShapedVoxel& voxel, unsigned sides, const SideMask** masks);
+unsigned find_covered_squares(const Job& job, const ShapedVoxel& voxel, const ShapedVoxel& shown, unsigned sides,
+                              const SideMask** masks);
 
 // Replaces `out` with the visible faces of the region's shapes. Requires: a kernel meshed the job.
 void append_shape_faces(const Job& job, ShapeFaceBuffer& out);

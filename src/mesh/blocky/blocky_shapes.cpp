@@ -77,8 +77,18 @@ class ModelFinder {
   // Appends a voxel. Its model is null if it follows the neighbours.
   void add(const IVec3& local, VoxelType type, std::uint32_t state) {
     const ShapedVoxels::KnownType& known = known_type(type);
-    ShapedVoxel voxel{.local = local, .type = type, .is_opaque = known.is_opaque};
+    ShapedVoxel voxel{.local = local,
+                      .type = type,
+                      .is_opaque = known.is_opaque,
+                      .is_fluid = known.fluid_groups != 0,
+                      .fluid = known.fluid_groups};
     if (!known.has_state) state = 0;
+    if (known.rules->fluid && known.rules->fluid->is_present(state)) {
+      voxel.fluid = known.rules->fluid->groups;
+      if (job_.region.contains(local)) {
+        shapes_.inner.push_back({.holder = static_cast<std::uint32_t>(shapes_.voxels.size()), .shown = {}});
+      }
+    }
     if (known.only_model != nullptr) {
       voxel.model = known.only_model;
     } else if (known.rules->neighbours == ShapeNeighbours::None) {
@@ -100,15 +110,32 @@ class ModelFinder {
         voxel.model = shape_at(*job_.chunks, *job_.types, voxel.local);
       } else if (is_connected) {
         voxel.model = model(voxel.type, state, {.connected = connections(voxel.local, state, known)});
+      } else if (is_below_fluid(voxel)) {
+        voxel.model = &(*job_.types)[voxel.type].shapes.model(0, {}, {.heights = {16, 16, 16, 16}});
       } else if (known.rules->neighbours == ShapeNeighbours::Stairs && !has_shaped_neighbours(voxel.local)) {
         voxel.model = model(voxel.type, state, {});
       } else {
         voxel.model = shape_at(*job_.chunks, *job_.types, voxel.local);
       }
     }
+    std::erase_if(shapes_.inner, [&](InnerShape& each) { return !find_fluid(each); });
   }
 
  private:
+  // Finds the fluid next to a shape. Returns false if no such fluid is registered.
+  [[nodiscard]] bool find_fluid(InnerShape& inner) {
+    const IVec3 local = shapes_.voxels[inner.holder].local;
+    const InnerFluid fluid = fluid_at(*job_.chunks, *job_.types, local);
+    if (fluid.model == nullptr) return false;
+    inner.shown = {.local = local,
+                   .type = fluid.type,
+                   .is_opaque = (*job_.types)[fluid.type].visibility == Visibility::Opaque,
+                   .is_fluid = true,
+                   .fluid = (*job_.types).fluid_groups(fluid.type),
+                   .model = fluid.model};
+    return true;
+  }
+
   [[nodiscard]] const ShapedVoxels::KnownType& known_type(VoxelType type) {
     ShapedVoxels::KnownType& known = shapes_.known_types[type % shapes_.known_types.size()];
     if (known.job == shapes_.job && known.type == type) return known;
@@ -119,6 +146,7 @@ class ModelFinder {
              .has_state = properties.state_bits != 0,
              .is_turned = !properties.orientations.empty(),
              .uses_position = properties.shapes.position_count() > 1,
+             .fluid_groups = (*job_.types).fluid_groups(type),
              .rules = &properties.shapes.rules()};
     if (!known.has_state && !known.uses_position && known.rules->neighbours == ShapeNeighbours::None) {
       known.only_model = model(type, 0, {});
@@ -158,6 +186,13 @@ class ModelFinder {
 
   [[nodiscard]] bool has_shaped_neighbours(const IVec3& local) const {
     return std::ranges::any_of(kDirections, [&](Direction d) { return is_shaped(local + normal_of(d)); });
+  }
+
+  // Returns true for a fluid with a fluid of its kind above, which fills its voxel. Requires: a voxel of the region.
+  [[nodiscard]] bool is_below_fluid(const ShapedVoxel& voxel) const {
+    if (!voxel.is_fluid) return false;
+    const ShapedVoxel* const above = shapes_.at(voxel.local + IVec3(0, 1, 0));
+    return above != nullptr && (above->fluid & voxel.fluid) != 0;
   }
 
   // As ShapeSurroundings::connected.
@@ -280,6 +315,7 @@ void list_shapes(const Job& job, bool row_ends, Scratch& s) {
   shapes.voxels.clear();
   shapes.quads.clear();
   shapes.pending.clear();
+  shapes.inner.clear();
   shapes.has_cells = false;
   ModelFinder models(job, row_ends, s);
   for (const std::uint16_t row : std::span(shapes.listed, shapes.listed_count)) {
@@ -309,7 +345,7 @@ void find_covered_sides(const Job& job, bool row_ends, Scratch& s) {
   fill(job, row_ends, s, ShapedVoxels::kWhole, shapes.sides);
   for (const ShapedVoxel& voxel : shapes.voxels) {
     const ShapeModel& model = *voxel.model;
-    const bool is_partial = voxel.is_opaque ? model.touched_sides != model.covered_sides : true;
+    const bool is_partial = !voxel.is_opaque || voxel.fluid != 0 || model.touched_sides != model.covered_sides;
     shapes.sides[ShapedVoxels::cell_at(voxel.local)] = static_cast<std::uint8_t>(
         (voxel.is_opaque ? model.covered_sides : 0) | (is_partial ? ShapedVoxels::kPartly : 0));
   }
@@ -574,7 +610,8 @@ void append_quads_next_to_shapes(const Job& job, Direction direction, Scratch& s
   s.quads += count;
 }
 
-unsigned find_covered_squares(const Job& job, const ShapedVoxel& voxel, unsigned sides, const SideMask** masks) {
+unsigned find_covered_squares(const Job& job, const ShapedVoxel& voxel, const ShapedVoxel& shown, unsigned sides,
+                              const SideMask** masks) {
   static constexpr SideMask kAll = {~std::uint64_t{0}, ~std::uint64_t{0}, ~std::uint64_t{0}, ~std::uint64_t{0}};
   unsigned covered = 0;
   for (; sides != 0; sides &= sides - 1) {
@@ -584,11 +621,10 @@ unsigned find_covered_squares(const Job& job, const ShapedVoxel& voxel, unsigned
         d < 2 ? &voxel + (d == 0 ? 1 : -1) : job.shapes->at(voxel.local + normal_of(static_cast<Direction>(d)));
     QUOIN_ASSERT(other != nullptr && other->local == voxel.local + normal_of(static_cast<Direction>(d)),
                  "a shaped neighbour");
-    if (!other->is_opaque && other->type != voxel.type) continue;
     // Fluids have the same heights at their common corners (`covers`).
-    const bool is_fluid =
-        !other->is_opaque && (*job.types)[other->type].shapes.rules().neighbours == ShapeNeighbours::Fluid;
-    masks[d] = is_fluid ? &kAll : &other->model->sides[d ^ 1U];
+    const bool is_joined = shown.is_fluid && !shown.is_opaque && (shown.fluid & other->fluid) != 0;
+    if (!is_joined && !other->is_opaque && other->type != shown.type) continue;
+    masks[d] = is_joined ? &kAll : &other->model->sides[d ^ 1U];
     covered |= 1U << d;
   }
   return covered;
@@ -599,6 +635,7 @@ void append_shape_faces(const Job& job, ShapeFaceBuffer& out) {
   if (!shapes.has_cells) return out.clear();  // all of the region is opaque
   std::size_t limit = 0;
   for (const ShapedVoxel& voxel : shapes.voxels) limit += voxel.model->packed_faces.size();
+  for (const InnerShape& inner : shapes.inner) limit += inner.shown.model->packed_faces.size();
   if (out.size() < limit) out.resize(limit);
   out.resize(static_cast<std::size_t>(job.kernel->write_shape_faces(job, out.data()) - out.data()));
 }

@@ -51,6 +51,24 @@ VoxelRegistry shaped_types() {
   add({.name = "block", .shapes = VoxelShape::box(IVec3(0), IVec3(16))});
   add({.name = "rubble", .state_bits = 3, .orientations = turns, .shapes = shapes_for_tests::rubble()});
   add({.name = "turned fence", .state_bits = 3, .orientations = turns, .shapes = shapes_for_tests::fence()});
+  for (const std::uint8_t red : {10, 20}) {
+    add({.name = "water",
+         .colour = {red, 90, 200, 120},
+         .visibility = Visibility::Transparent,
+         .state_bits = 3,
+         .shapes = *VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid, .groups = 2})});
+  }
+  // Slabs and fences in water, if bit 0 of their state is set.
+  const ContainedFluid fluid{.groups = 2, .when = {{.state_mask = 1, .state = 1}}};
+  ShapeRules wet_slab{.parts = {{.shape = shapes_for_tests::slab()}}};
+  wet_slab.fluid = fluid;
+  add({.name = "wet slab",
+       .state_bits = 3,
+       .orientations = turns,
+       .shapes = *VoxelShapes::from_rules(std::move(wet_slab))});
+  ShapeRules wet_fence = shapes_for_tests::fence().rules();
+  wet_fence.fluid = fluid;
+  add({.name = "wet fence", .state_bits = 1, .shapes = *VoxelShapes::from_rules(std::move(wet_fence))});
   return types;
 }
 
@@ -153,27 +171,50 @@ bool is_behind_own_boxes(const ShapeModel& model, const ModelFace& face) {
 
 using ShapeKey = std::tuple<int, int, int, std::size_t>;  // x, y, z, number of the face
 using ShapeSet = std::map<ShapeKey, UnitFace>;
+constexpr std::size_t kOfInnerFluid = 1'000;  // added to the number of a face
+
+// Adds the visible faces of the model of a voxel.
+void add_shape_faces(const Grid& grid, const VoxelRegistry& types, const IVec3& v, VoxelType type,
+                     const ShapeModel& model, bool occlusion, std::size_t first, ShapeSet& faces) {
+  for (std::size_t i = 0; i < model.faces.size(); ++i) {
+    const ModelFace& face = model.faces[i];
+    const IVec3 at = v + normal_of(face.direction);
+    const auto side = static_cast<std::size_t>(face.direction);
+    const ShapeModel& own = *shape_at(grid, types, v);
+    const bool is_behind_own_side =
+        &own != &model && types[grid.get(v)].visibility == Visibility::Opaque && own.covers_side[side];
+    const bool is_in_fluid = (fluid_at(grid, types, at).groups & types.fluid_groups(type)) != 0;
+    if (face.on_side && (is_behind_own_side || is_in_fluid ||
+                         covers(types, grid.get(at), shape_at(grid, types, at), type, face.direction, face.mask))) {
+      continue;
+    }
+    if (is_behind_own_boxes(model, face)) continue;
+    UnitFace made{type, {}};
+    const bool is_inclined = glm::abs(face.normal[frame_of(face.direction).axis]) < 0.999F;
+    const bool is_free_top = model.free_faces != 0 && face.direction == Direction::PosY;
+    for (std::size_t corner = 0; corner < 4 && occlusion && !is_inclined && !is_free_top; ++corner) {
+      Vec3 lower = face.corners[0];
+      Vec3 upper = face.corners[0];
+      for (const Vec3& each : face.corners) {
+        lower = glm::min(lower, each);
+        upper = glm::max(upper, each);
+      }
+      const Vec3 middle = 0.5F * (lower + upper);
+      made.corners[corner] = corner_occlusion(grid, types, v, face.corners[corner], middle, face.direction);
+    }
+    faces[{v.x, v.y, v.z, first + i}] = made;
+  }
+}
 
 ShapeSet shape_faces(const Grid& grid, const VoxelRegistry& types, bool occlusion) {
   ShapeSet faces;
   grid.for_each([&](IVec3 v, VoxelType type) {
     const ShapeModel* const model = shape_at(grid, types, v);
     if (model == nullptr) return;
-    for (std::size_t i = 0; i < model->faces.size(); ++i) {
-      const ModelFace& face = model->faces[i];
-      const IVec3 at = v + normal_of(face.direction);
-      if (face.on_side && covers(types, grid.get(at), shape_at(grid, types, at), type, face.direction, face.mask)) {
-        continue;
-      }
-      if (is_behind_own_boxes(*model, face)) continue;
-      UnitFace made{type, {}};
-      const bool is_inclined = glm::abs(face.normal[frame_of(face.direction).axis]) < 0.999F;
-      for (std::size_t corner = 0; corner < 4 && occlusion && !is_inclined; ++corner) {
-        const Vec3 middle = 0.5F * (face.corners[0] + face.corners[2]);
-        made.corners[corner] = corner_occlusion(grid, types, v, face.corners[corner], middle, face.direction);
-      }
-      faces[{v.x, v.y, v.z, i}] = made;
-    }
+    add_shape_faces(grid, types, v, type, *model, occlusion, 0, faces);
+    const InnerFluid fluid = fluid_at(grid, types, v);
+    if (fluid.model == nullptr) return;
+    add_shape_faces(grid, types, v, fluid.type, *fluid.model, occlusion, kOfInnerFluid, faces);
   });
   return faces;
 }
@@ -193,9 +234,10 @@ Meshed meshed(const Grid& grid, const VoxelRegistry& types, const QuadOptions& o
     for (std::size_t i = 1; i < quads.size(); ++i) EXPECT_LE(quads[i - 1].direction(), quads[i].direction());
     for (const ShapeFace& face : shapes) {
       const IVec3 at = chunk * kChunkEdge + face.voxel();
-      EXPECT_EQ(face.model, shape_at(grid, types, at));
-      EXPECT_TRUE(
-          result.shapes.emplace(ShapeKey{at.x, at.y, at.z, face.face}, UnitFace{face.type, face.occlusion()}).second);
+      const bool is_own = face.model == shape_at(grid, types, at);
+      EXPECT_TRUE(is_own || face.model == fluid_at(grid, types, at).model);
+      const ShapeKey key{at.x, at.y, at.z, face.face + (is_own ? 0 : kOfInnerFluid)};
+      EXPECT_TRUE(result.shapes.emplace(key, UnitFace{face.type, face.occlusion()}).second);
     }
   }
   return result;

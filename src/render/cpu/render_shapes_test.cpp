@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include <quoin/mesh/blocky.h>
+#include <quoin/scene/scene_query.h>
 
 #include "grid/shapes/shape_types_for_tests.h"
 #include "render/cpu/render_test_support.h"
@@ -264,6 +265,111 @@ TEST(RenderShapes, WaterTintsByItsDepth) {
   const Pixel wet = pixel_at(image, 16, 4);
   EXPECT_GT(wet[2], wet[0] + 20);
   EXPECT_FLOAT_EQ(depth_at(image, 16, 28), 14.0F);
+}
+
+// Glass, as cubes or as shapes that are cubes.
+Scene glass_blocks(bool with_shapes, bool has_textures, bool has_other_side) {
+  std::mt19937 random(4);
+  Scene scene;
+  const VoxelType stone = *scene.types.add({.name = "stone", .colour = {160, 150, 140}});
+  VoxelProperties glass{.name = "glass", .colour = {60, 160, 220, 90}, .visibility = Visibility::Transparent};
+  if (has_textures) glass.faces = VoxelFaces({.texture = right_half(90), .alpha = FaceAlpha::Translucent});
+  if (with_shapes) {
+    ShapeElement element;
+    if (has_other_side) element.faces[2].face = VoxelFace{.tint = {250, 10, 10}, .alpha = FaceAlpha::Translucent};
+    glass.shapes = *VoxelShape::from_elements({element});
+  }
+  const VoxelType type = *scene.types.add(glass);
+  Grid grid;
+  grid.fill_box({{-20, -3, -20}, {20, 0, 20}}, stone);
+  grid.fill_box({{-12, 0, -12}, {-2, 6, 4}}, type);
+  for (int i = 0; i < 120; ++i) {
+    const auto at = [&](int size) { return static_cast<int>(random() % static_cast<unsigned>(size)); };
+    grid.set({at(24) - 12, at(6), at(24) - 12}, random() % 4 == 0 ? stone : type);
+  }
+  place(scene, std::move(grid));
+  return scene;
+}
+
+TEST(RenderShapes, GlassCubesAsShapesGiveTheSamePixels) {
+  const Camera camera = towards({22.0, 20.0, 31.0}, {0.0, 2.0, 0.0});
+  for (const bool has_textures : {false, true}) {
+    const RenderedImage cube = taken(glass_blocks(false, has_textures, false), camera, sized(96, 64));
+    const RenderedImage shape = taken(glass_blocks(true, has_textures, false), camera, sized(96, 64));
+    EXPECT_EQ(cube.colour.rgb, shape.colour.rgb) << "textures " << has_textures;
+    EXPECT_EQ(cube.depth.values, shape.depth.values);
+    const RenderedImage other = taken(glass_blocks(true, has_textures, true), camera, sized(96, 64));
+    EXPECT_GT(count_different(cube, other, 8), 100) << "a side with another look is no cube";
+  }
+}
+
+// A pool of two types of water, with fences in it.
+struct Pool {
+  Scene scene;
+  VoxelType fence = kAir;
+
+  Pool(std::uint32_t second_groups, std::uint32_t fence_state) {
+    const auto water = [&](std::uint8_t red, std::uint32_t groups) {
+      return *scene.types.add(
+          {.name = "water",
+           .colour = {red, 90, 200, 120},
+           .visibility = Visibility::Transparent,
+           .state_bits = 4,
+           .shapes = *VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid, .groups = groups})});
+    };
+    const VoxelType first = water(40, 2);
+    const VoxelType second = water(90, second_groups);
+    ShapeRules rules = shapes_for_tests::fence().rules();
+    rules.fluid = ContainedFluid{.groups = 2, .when = {{.state_mask = 1, .state = 1}}};
+    fence = *scene.types.add({.name = "fence", .state_bits = 1, .shapes = *VoxelShapes::from_rules(std::move(rules))});
+    Grid grid;
+    grid.fill_box({{0, 0, 0}, {6, 3, 8}}, first);
+    grid.fill_box({{6, 0, 0}, {12, 3, 8}}, second);
+    grid.set({3, 1, 4}, fence, {.state = fence_state});
+    grid.set({3, 2, 6}, fence, {.state = fence_state});
+    place(scene, std::move(grid));
+  }
+
+  [[nodiscard]] std::vector<GlassBody> bodies_along(const Ray& ray) const {
+    const SceneTracer tracer(scene);
+    const SceneView view(tracer, DVec3(0.0));
+    SeenThrough seen;
+    find_transparent(view, Surfaces(scene.types), ray, 100.0, seen);
+    return seen.bodies;
+  }
+};
+
+TEST(RenderShapes, FluidsOfOneKindAreOneBody) {
+  for (const double y : {0.5, 1.5, 2.5}) {
+    const Ray ray{{-4.0, y, 1.5}, {1.0, 0.0, 0.0}};
+    const auto joined = Pool(2, 1).bodies_along(ray);
+    ASSERT_EQ(joined.size(), 1U) << y;
+    EXPECT_NEAR(joined[0].voxels, 12.0, 1e-9);
+    EXPECT_EQ(joined[0].type, 1) << "the one that the ray enters";
+    EXPECT_EQ(Pool(4, 1).bodies_along(ray).size(), 2U) << "of other kinds";
+  }
+}
+
+TEST(RenderShapes, WaterSurroundsShapesThatContainIt) {
+  // Past the post of a fence below the surface, and of one at the surface.
+  for (const IVec3 at : {IVec3{3, 1, 4}, IVec3{3, 2, 6}}) {
+    const Ray ray{{-4.0, at.y + 0.5, at.z + 0.1}, {1.0, 0.0, 0.0}};
+    const auto wet = Pool(2, 1).bodies_along(ray);
+    ASSERT_EQ(wet.size(), 1U);
+    EXPECT_NEAR(wet[0].voxels, 12.0, 1e-9);
+    const auto dry = Pool(2, 0).bodies_along(ray);
+    ASSERT_EQ(dry.size(), 2U);
+    EXPECT_NEAR(dry[0].voxels, 3.0, 1e-9);
+  }
+  // Queries are about the fence.
+  const Pool pool(2, 1);
+  const SceneTracer tracer(pool.scene);
+  const auto hit = first_hit(tracer, Ray{{3.5, 2.5, 20.0}, {0.0, 0.0, -1.0}});
+  ASSERT_TRUE(hit);
+  EXPECT_EQ(hit->voxel, IVec3(3, 2, 7)) << "water";
+  const auto post = first_hit(tracer, Ray{{3.5, 9.0, 6.5}, {0.0, -1.0, 0.0}});
+  ASSERT_TRUE(post);
+  EXPECT_EQ(post->t, 6.0) << "the top of the post, above the water";
 }
 
 // A cube whose state turns it looks like the cube in a turned grid.

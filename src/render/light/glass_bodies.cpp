@@ -24,8 +24,8 @@ constexpr double kLeastClosing = 1e-9;            // for clear materials
 constexpr double kLargestBlock = 64.0;            // of one type in a tree
 constexpr double kThinnest = 1e-9;                // length in voxels of a plate, which has none
 
-bool continues(const GlassBody& body, VoxelType type, double t_enter) {
-  return type == body.type && reaches(body, t_enter);
+bool continues(const Surfaces& surfaces, const GlassBody& body, VoxelType type, double t_enter) {
+  return surfaces.joins(type, body.type) && reaches(body, t_enter);
 }
 
 // Returns the alpha of a translucent texel, 0 to 1.
@@ -142,7 +142,7 @@ class BodiesOfGrid {
   // inside.
   [[nodiscard]] const FaceTexels* side_entered(const TypeFaces& faces, VoxelType type, const trace::WalkSpan& begun,
                                                Rgba8& texel) const {
-    if (out_.size() > first_ && continues(out_.back(), type, begun.t_enter)) {
+    if (out_.size() > first_ && continues(surfaces_, out_.back(), type, begun.t_enter)) {
       const GlassBody& body = out_.back();
       texel = body.texel;
       return body.is_textured ? &faces.sides[static_cast<std::size_t>(body.face)] : nullptr;
@@ -162,7 +162,7 @@ class BodiesOfGrid {
     const double t_exit = std::min(span.t_exit, max_t_);
     const double voxels = voxels_between(span.t_enter, t_exit);
     if (!(voxels > 0.0)) return true;  // an edge that it only touches
-    if (out_.size() > first_ && continues(out_.back(), type, span.t_enter)) {
+    if (out_.size() > first_ && continues(surfaces_, out_.back(), type, span.t_enter)) {
       // Most water voxels are inside the water.
       lengthen(t_exit, span.exit_face, voxels);
     } else {
@@ -248,7 +248,7 @@ class BodiesOfGrid {
   // Returns false if nothing behind the body is visible.
   bool add(const GlassBody& next) {
     if (!(next.voxels > 0.0)) return true;  // an edge that it only touches
-    if (out_.size() > first_ && continues(out_.back(), next.type, next.t_enter)) {
+    if (out_.size() > first_ && continues(surfaces_, out_.back(), next.type, next.t_enter)) {
       GlassBody& body = out_.back();
       if (next.t_exit <= body.t_exit) return true;  // within it: the same box in another cell, or crossing plates
       body.exit_in_shape = next.exit_in_shape;
@@ -279,13 +279,13 @@ class BodiesOfGrid {
 };
 
 // Sorts bodies along the ray and joins those of neighbouring grids that touch.
-void join_touching(std::vector<GlassBody>& bodies) {
+void join_touching(const Surfaces& surfaces, std::vector<GlassBody>& bodies) {
   std::sort(bodies.begin(), bodies.end(), [](const GlassBody& a, const GlassBody& b) {
     return a.t_enter != b.t_enter ? a.t_enter < b.t_enter : a.placed < b.placed;
   });
   std::size_t kept = 0;
   for (std::size_t i = 1; i < bodies.size(); ++i) {
-    if (continues(bodies[kept], bodies[i].type, bodies[i].t_enter)) {
+    if (continues(surfaces, bodies[kept], bodies[i].type, bodies[i].t_enter)) {
       if (bodies[i].t_exit > bodies[kept].t_exit) {
         bodies[kept].t_exit = bodies[i].t_exit;
         bodies[kept].exit_placed = bodies[i].exit_placed;
@@ -336,7 +336,7 @@ void find_transparent(const SceneView& view, const Surfaces& surfaces, const Ray
     if (has_shapes) bodies.add_shapes();
     if (placed.glass != nullptr) bodies.add_field();
   });
-  if (lists > 1) join_touching(out.bodies);
+  if (lists > 1) join_touching(surfaces, out.bodies);
   if (!out.faces.empty()) end_at_first_closed(out);
 }
 

@@ -169,7 +169,8 @@ bool PathTile::leave_glass(std::uint32_t index, float u) {
   Path& path = paths_[index];
   const Ray ray{path.origin, DVec3(path.direction)};
   const std::vector<GlassBody>& bodies = seen_.bodies;
-  const bool is_within = !bodies.empty() && bodies.front().starts_inside && bodies.front().type == path.inside;
+  const bool is_within =
+      !bodies.empty() && bodies.front().starts_inside && context_->surfaces->joins(bodies.front().type, path.inside);
   if (!is_within) {  // the path left through a corner, or by rounding
     path.inside = kAir;
     if (pass_clouds(index, u)) return true;

@@ -63,8 +63,12 @@ vec3 passed_by_body(Body body) {
   float cover = cover_of_face(body);
   return (1.0 - cover) * (1.0 - cover * (1.0 - surface.colour));
 }
+// Returns true if voxels of both types are one body of glass: equal types, or fluids of one kind.
+bool joins(uint a, uint b) {
+  return a == b || (kHasShapes && fluid_of(a) != 0 && fluid_of(a) == fluid_of(b));
+}
 bool continues(Body body, Body next) {
-  return !is_face(body) && !is_face(next) && type_of(next) == type_of(body) && reaches(body, next.lengths.x);
+  return !is_face(body) && !is_face(next) && reaches(body, next.lengths.x) && joins(type_of(next), type_of(body));
 }
 
 struct BodyList {

@@ -17,6 +17,12 @@ Surface surface_of(uint type) {
   return Surface(colour.xyz, colour.w, emitted.xyz, surfaces.at[i + 2].xyz, emitted.w);
 }
 
+// Returns the first fluid of the kind of a type; 0 for other types.
+uint fluid_of(uint type) {
+  float last = Vectors(frame().surfaces).at[3 * min(type, frame().last_surface) + 2].w;
+  return last > 1.0 ? uint(last) - 1 : 0;
+}
+
 #include "textures.glsl"
 
 // Shows the look of a cell of a halved grid, if its type has shapes. Returns true if it has.

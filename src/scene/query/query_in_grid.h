@@ -107,21 +107,23 @@ class ShapeObstacles {
 
   /// Returns the bounds of voxels and shapes. `of_voxels`: of the grid.
   [[nodiscard]] IBox bounds(const IBox& of_voxels) const { return unite(of_voxels, shapes_.touched.bounds()); }
-  /// Returns true if the query meets voxels of a type, and they are cubes.
-  [[nodiscard]] bool is_cube_met(VoxelType type) const {
-    return types_.holds(type) && !types_.registry().is_shaped(type);
+  /// Returns true if the query meets a voxel of a type, and it is a cube.
+  [[nodiscard]] bool is_cube_met(IVec3 voxel, VoxelType type) const {
+    if (!types_.holds(type)) return false;
+    return !types_.registry().is_shaped(type) || shapes_.index.is_cube(voxel);
   }
   /// Calls `visit(voxel, box)` for each box that the query meets of the shapes that touch a cell. `voxel`: of the
   /// shape.
   template <class Visit>
   void visit(IVec3 cell, const Visit& visit) const {
-    for (const PlacedShape& shape : shapes_.index.at(cell)) {
-      const VoxelProperties& type = types_.registry()[shape.type];
-      if (types_.parts() == ShapeParts::Colliding && !type.collides) continue;
-      if (types_.parts() == ShapeParts::Opaque && type.visibility != Visibility::Opaque) continue;
-      const DVec3 at(shape.voxel);
+    for (const ListedShape& shape : shapes_.index.at(cell).listed()) {
+      if (shape.is_inner) continue;
+      if (types_.parts() == ShapeParts::Colliding && !types_.registry()[shape.type].collides) continue;
+      if (types_.parts() == ShapeParts::Opaque && !shape.is_opaque) continue;
+      const IVec3 voxel = shape.voxel(cell);
+      const DVec3 at(voxel);
       visit_solid_boxes(*shape.model, types_.parts() != ShapeParts::Colliding, [&](const DBox& box) {
-        visit(shape.voxel, DBox{box.min + at, box.max + at});
+        visit(voxel, DBox{box.min + at, box.max + at});
       });
     }
   }

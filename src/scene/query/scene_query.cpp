@@ -213,7 +213,7 @@ std::optional<SceneOverlap> first_with_shapes(const PlacedGrid& placed, const Ty
     for (int y = cells.min.y; y < cells.max.y; ++y) {
       for (int x = cells.min.x; x < cells.max.x; ++x) {
         const IVec3 cell(x, y, z);
-        if (shapes.is_cube_met(reader.get(cell)) && shape.meets(cell)) take(cell);
+        if (shapes.is_cube_met(cell, reader.get(cell)) && shape.meets(cell)) take(cell);
         shapes.visit(cell, [&](IVec3 voxel, const DBox& box) {
           if (shape.meets(box)) take(voxel);
         });

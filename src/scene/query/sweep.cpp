@@ -203,7 +203,7 @@ class BlockSweep {
       for (int y = near.min.y; y < near.max.y; ++y) {
         for (int x = near.min.x; x < near.max.x; ++x) {
           const IVec3 cell{x, y, z};
-          if (shapes_->is_cube_met(reader_.get(cell))) check_box(cell, DBox{DVec3(cell), DVec3(cell) + 1.0});
+          if (shapes_->is_cube_met(cell, reader_.get(cell))) check_box(cell, DBox{DVec3(cell), DVec3(cell) + 1.0});
           shapes_->visit(cell, [&](IVec3 voxel, const DBox& box) { check_box(voxel, box); });
         }
       }
@@ -240,7 +240,7 @@ class BlockSweep {
     const bool is_upper = contact.normal[contact.axis] > 0.0;
     point[contact.axis] = is_upper ? box.max[contact.axis] + 1e-6 : box.min[contact.axis] - 1e-6;
     const IVec3 cell(glm::floor(point));
-    bool is_covered = shapes_->is_cube_met(reader_.get(cell));
+    bool is_covered = shapes_->is_cube_met(cell, reader_.get(cell));
     shapes_->visit(cell, [&](IVec3 /*voxel*/, const DBox& other) {
       is_covered |= glm::all(glm::greaterThan(point, other.min)) && glm::all(glm::lessThan(point, other.max));
     });

@@ -215,6 +215,7 @@ inline void expect_same_shapes(const TracedShapes* a, const TracedShapes* b, Tra
   EXPECT_EQ(a->index.bounds(), b->index.bounds());
   EXPECT_EQ(a->touched.bounds(), b->index.bounds());
   for (const IVec3 chunk : b->index.chunks()) {
+    EXPECT_TRUE(std::ranges::equal(a->index.cubes_in(chunk), b->index.cubes_in(chunk)));
     for (int i = 0; i < kChunkEdge * kChunkEdge; i += 7) {
       const IVec3 first = chunk * kChunkEdge + IVec3(0, i % kChunkEdge, i / kChunkEdge);
       const std::uint64_t row = b->index.touched_row(first);

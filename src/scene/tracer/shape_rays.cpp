@@ -194,6 +194,7 @@ class ShapeRay {
     end_ = std::min(t_exit + room_, max_t_);
     for (const ListedShape& shape : here.listed()) {
       if (parts_ == ShapeParts::Opaque && !shape.is_opaque) continue;
+      if (shape.is_inner && parts_ != ShapeParts::Visible) continue;
       if (parts_ == ShapeParts::Colliding && !types_[shape.type].collides) continue;
       const auto take_part = [&](const ModelBox* box, const End& enter, const End& exit) {
         if (parts_ == ShapeParts::Visible) return take_visible({here.voxel(), &shape, box}, enter, exit);

@@ -73,7 +73,7 @@ struct ShapeUv {
 
 /// The parts of shapes that a ray can hit.
 enum class ShapeParts : std::uint8_t {
-  All,        ///< boxes and fluids, with drawn sides or without
+  All,        ///< boxes and fluids, with drawn sides or without, except for fluids next to a voxel's own shape
   Colliding,  ///< the ones that stop moving bodies
   Opaque,     ///< those of an opaque material
   Visible,    ///< drawn sides that hide the background: opaque ones, and visible texels of cutout ones

@@ -171,16 +171,17 @@ bool has_glass(const DensityGrid& field, const VoxelRegistry& types, const Densi
 
 bool TreeCache::update(const Grid& grid, const VoxelRegistry& types) {
   PendingChanges changes(followed_, grid);
+  if (changes->all) transparent_.reset();
   const bool has_other_shapes = update_shapes(grid, types, *changes);
   if (changes->empty()) return has_other_shapes;
-  if (changes->all) transparent_.reset();
   opaque_.update(grid, types, *changes);
-  update_transparent(grid, types, *changes);
+  if (!has_other_shapes) update_transparent(grid, types, *changes);
   changes.commit();
   return true;
 }
 
-// If there were no shapes, only the changed chunks can contain some.
+// If there were no shapes, only the changed chunks can contain some. Returns true if it has updated the trees of shapes
+// and of transparent cubes.
 bool TreeCache::update_shapes(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) {
   if (shaped_ == ShapedVoxels::AsCubes || (!types.has_shapes() && shapes_ == nullptr)) return false;
   if (changes.all) shapes_.reset();
@@ -205,10 +206,28 @@ bool TreeCache::update_shapes(const Grid& grid, const VoxelRegistry& types, cons
   shapes_->solid.update(chunks_of_both(changed, changes.chunks(grid), is_new, grid), solid_rows);
   const auto glass_rows = [&](IVec3 first) { return glass_row(shapes, first); };
   if (!shapes_->is_glass.empty()) shapes_->glass.update(changed, glass_rows);
+  update_glass_cubes(grid, types, chunks_of_both(changed, changes.chunks(grid), false, grid));
   if (shapes_->index.empty()) shapes_.reset();
   data_changes.commit();
   followed_ = followed;
   return true;
+}
+
+// Replaces chunks of the tree of transparent cubes, which has shapes that are cubes.
+void TreeCache::update_glass_cubes(const Grid& grid, const VoxelRegistry& types, const std::vector<IVec3>& chunks) {
+  const ShapeIndex& index = shapes_->index;
+  const auto cubes_in = [&](IVec3 chunk) { return index.cubes_in(chunk); };
+  if (!transparent_) {
+    const auto is_glass = [&](VoxelType type) { return types.is_transparent(type) && !types.is_shaped(type); };
+    const bool has_any = std::ranges::any_of(chunks, [&](IVec3 at) {
+      const Chunk* const chunk = grid.find_chunk(at);
+      return !index.cubes_in(at).empty() || (chunk != nullptr && std::ranges::any_of(chunk->types(), is_glass));
+    });
+    if (!has_any) return;
+    transparent_.emplace(Occupancy::Glass);
+  }
+  transparent_->update(grid, types, chunks, cubes_in);
+  if (transparent_->bounds().empty()) transparent_.reset();
 }
 
 bool TreeCache::update(const DensityGrid& field, const VoxelRegistry& types) {

@@ -84,7 +84,7 @@ struct TracedShapes {
 /// The treatment of voxels whose type has shapes.
 enum class ShapedVoxels : std::uint8_t {
   AsCubes,  ///< transparent cubes of their type's colour
-  ByShape,  ///< not in the trees of opaque and transparent voxels, but in `shapes`
+  ByShape,  ///< not in the trees of opaque and transparent voxels, but in `shapes`, except for ShapeIndex::cubes_in
 };
 
 /// The tracing data of one grid for rendering, and its read position in the grid's changes.
@@ -130,6 +130,7 @@ class TreeCache {
  private:
   static const DensityTree* if_any(const DensityTree& tree) { return tree.cells().bounds().empty() ? nullptr : &tree; }
   void update_transparent(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes);
+  void update_glass_cubes(const Grid& grid, const VoxelRegistry& types, const std::vector<IVec3>& chunks);
   bool update_shapes(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes);
   void update_split(const DensityGrid& field, const VoxelRegistry& types, const DensityChanges& changes);
 

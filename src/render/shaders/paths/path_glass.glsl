@@ -177,7 +177,7 @@ void enter_glass(Body body, float u, inout Glass glass) {
 
 // Returns true if the path, or the camera, is in the first glass body on its ray.
 bool is_within(Body body) {
-  return is_begun(body) && (path.more.x == 0 || type_of(body) == path.more.x);
+  return is_begun(body) && (path.more.x == 0 || joins(type_of(body), path.more.x));
 }
 // Returns the distance where the path leaves the first body; -1 if it is not within that. Before, it meets faces of
 // cells: those of other grids, and those at the end of the glass.

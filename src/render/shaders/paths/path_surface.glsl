@@ -23,6 +23,11 @@ Surface surface_of(uint type) {
   return Surface(colour.xyz, colour.w, emitted.xyz, passed.xyz, emitted.w, passed.w, rest.x, rest.y, rest.z);
 }
 
+// As in lit.glsl.
+uint fluid_of(uint type) {
+  return uint(Vectors(frame().surfaces).at[4 * min(type, frame().last_surface) + 3].w);
+}
+
 #include "textures.glsl"
 
 // As in lit.glsl.

@@ -472,7 +472,8 @@ Status DeviceTextures::try_put(const VoxelRegistry& types) {
     QUOIN_ASSERT(number <= kTextureNumber, "a number per type");
     numbers[i] |= number;
     if (!is_opaque) numbers[i] |= is_glass ? kIsTexturedGlass : kIsCellOfFaces;
-    has_cells = has_cells || (!is_opaque && !types.is_shaped(static_cast<VoxelType>(i)));
+    // Shapes of glass may be cubes.
+    has_cells = has_cells || (!is_opaque && (is_glass || !types.is_shaped(static_cast<VoxelType>(i))));
     if (type.orientations.empty()) continue;
     numbers[i] |= kIsTurnedByState | state_turn(type.orientations, 0) << kTextureTurn;
   }
@@ -594,7 +595,8 @@ std::vector<Vec4> surface_table(const VoxelRegistry& types) {
     const auto id = static_cast<VoxelType>(std::min(type, kMaxVoxelTypes));
     // Cells of shapes in halved grids are opaque, but darken no corners.
     const bool is_open = !types.occludes(id) && (types.is_opaque(id) || types.is_shaped(id));
-    add_surface(surfaces[id], is_open ? 1.0F : 0.0F, table);
+    // Fluids, whose types have shapes: 1 + the first fluid of their kind.
+    add_surface(surfaces[id], is_open ? 1.0F + static_cast<float>(surfaces.fluid(id)) : 0.0F, table);
   }
   return table;
 }

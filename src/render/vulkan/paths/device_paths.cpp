@@ -21,7 +21,8 @@ std::vector<Vec4> path_surface_table(const Surfaces& surfaces, std::size_t types
   for (std::size_t type = 0; type <= types; ++type) {
     const Surface& surface = surfaces[static_cast<VoxelType>(std::min(type, kMaxVoxelTypes))];
     add_surface(surface, surface.roughness, table);
-    table.emplace_back(surface.metalness, surface.scattering, surface.anisotropy, 0.0F);
+    const VoxelType fluid = surfaces.fluid(static_cast<VoxelType>(std::min(type, kMaxVoxelTypes)));
+    table.emplace_back(surface.metalness, surface.scattering, surface.anisotropy, static_cast<float>(fluid));
   }
   return table;
 }

@@ -95,7 +95,7 @@ Status DeviceGrid::update(ShaderMemory& memory, const Content& content) {
       with_other_shapes.empty() && !content.voxels->has_changed_since(followed_)) {
     return {};
   }
-  Status done = update_voxels(memory, content);
+  Status done = update_voxels(memory, content, with_other_shapes);
   if (done) {
     done = update_field(memory, field, field_chunks_, followed_field_, [&](IVec3 chunk) {
       return put_part(memory, field_chunks_, chunk, pack_field_chunk(content.field->cells(), *field, chunk));
@@ -178,7 +178,10 @@ Status DeviceGrid::update_tops(ShaderMemory& memory, const Content& content) {
   return {};
 }
 
-Status DeviceGrid::update_voxels(ShaderMemory& memory, const Content& content) {
+// `with_other_shapes`: chunks whose voxels may have changed, too: the tree of transparent voxels has shapes that are
+// cubes.
+Status DeviceGrid::update_voxels(ShaderMemory& memory, const Content& content,
+                                 std::span<const IVec3> with_other_shapes) {
   PendingChanges changes(followed_, *content.voxels);
   if (changes->all) {
     drop_all(memory, chunks_);
@@ -188,6 +191,7 @@ Status DeviceGrid::update_voxels(ShaderMemory& memory, const Content& content) {
   }
   std::set<IVec3, ByPlace> chunks;
   for (const ChunkChange& change : changes->items_unless_all()) chunks.insert(change.chunk);
+  if (!changes->all) chunks.insert(with_other_shapes.begin(), with_other_shapes.end());
   ChangeCursor at_data = std::exchange(followed_data_, {});
   if (content.turned_types != nullptr) {
     const DataChanges data = content.voxels->data_changes_since(at_data);

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include <quoin/grid/grid.h>
@@ -93,7 +94,7 @@ class DeviceGrid {
   };
   using Chunks = std::map<IVec3, DeviceChunk, ByPlace>;
 
-  Status update_voxels(ShaderMemory& memory, const Content& content);
+  Status update_voxels(ShaderMemory& memory, const Content& content, std::span<const IVec3> with_other_shapes);
   template <class PutChunk>
   static Status update_field(ShaderMemory& memory, const DensityGrid* field, Chunks& chunks, ChangeCursor& followed,
                              const PutChunk& put_chunk);
