@@ -523,6 +523,8 @@ TEST(VoxelShape, RejectsFluidsWithoutGroupsAndWithNeighbours) {
             start + "the fluid that voxels contain depends on neighbours");
   EXPECT_EQ(error_of(with({.groups = 2, .when = {{.corner = StairCorner::Straight}}})),
             start + "the fluid that voxels contain depends on neighbours");
+  EXPECT_EQ(error_of(with({.groups = 2, .when = {{.positions = {2, 0, 1}}}})),
+            start + "the fluid that voxels contain depends on positions");
   ShapeRules fluid = with({.groups = 2});
   fluid.neighbours = ShapeNeighbours::Fluid;
   EXPECT_EQ(error_of(fluid), start + "a fluid contains a fluid");
