@@ -109,6 +109,25 @@ TEST(NodePack, TurnsBoxesByAllFacedirs) {
   }
 }
 
+TEST(NodePack, HasOrientationsOfEveryTurn) {
+  const StateOrientations facedir = node_orientations("facedir");
+  const StateOrientations quarters = node_orientations("4dir");
+  ASSERT_EQ(facedir.by_value.size(), 32U);
+  ASSERT_EQ(quarters.by_value.size(), 4U);
+  std::set<int> different;
+  for (std::size_t value = 0; value < 24; ++value) {
+    different.insert(facedir.by_value[value].index());
+    EXPECT_FALSE(facedir.by_value[value].is_mirrored());
+    EXPECT_TRUE(value >= 4 || quarters.by_value[value] == facedir.by_value[value]) << value;
+  }
+  EXPECT_EQ(different.size(), 24U);
+  EXPECT_EQ(quarters.of(0xFD), quarters.by_value[1]) << "the upper bits are a colour";
+  EXPECT_TRUE(node_orientations("sideways").empty());
+  // The front of facedir 1 is at +x: nodes look towards -z, which is +z of grids.
+  EXPECT_EQ(facedir.by_value[0].apply(Direction::NegZ), Direction::NegZ);
+  EXPECT_EQ(facedir.by_value[1].apply(Direction::NegZ), Direction::PosX);
+}
+
 TEST(NodePack, MountsOnSixWalls) {
   const VoxelProperties sign = shown_node("default:sign_wall_wood");
   // +y, -y, +x, -x, +z, -z of Luanti, whose z is mirrored in grids.
@@ -408,6 +427,7 @@ TEST(NodeTables, NameFaultsOfTraits) {
   EXPECT_NE(fault(R"("turn": "sideways", )").find("unknown turn sideways"), std::string::npos);
   EXPECT_NE(fault(R"("joins": "hands", )").find("unknown joins hands"), std::string::npos);
   EXPECT_NE(fault(R"("fluid": "gas", )").find("unknown fluid gas"), std::string::npos);
+  EXPECT_NE(fault(R"("mirror": "sideways", )").find("unknown mirror sideways"), std::string::npos);
   EXPECT_NE(fault(R"("turn": 4, )").find("unknown key turn"), std::string::npos);
 }
 
