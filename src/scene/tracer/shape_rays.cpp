@@ -401,7 +401,7 @@ class SolidRays {
         rest_(packet),
         shapes_(shapes.index),
         walk_(shapes.solid),
-        bounds_(shapes.solid.bounds()) {
+        bounds_(unite(shapes.solid.bounds(), shapes.touched.bounds())) {
     rest_.active = 0;
   }
   void set_packet(const RayPacket& packet) {

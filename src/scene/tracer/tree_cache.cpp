@@ -45,6 +45,38 @@ std::vector<std::uint8_t> glass_types(const VoxelRegistry& types) {
   return is_glass;
 }
 
+// Returns true if no part of a type's shapes hides the background: all are glass. Requires: the type has shapes.
+bool is_only_glass(const VoxelProperties& type) {
+  bool has_visible = type.visibility == Visibility::Opaque;
+  for_each_look(type, [&](const VoxelFace& look) {
+    has_visible = has_visible || (!look.texture.is_null() && look.alpha != FaceAlpha::Translucent);
+  });
+  return !has_visible;
+}
+
+// Returns a flag per type: rays for visible parts need not look at its shapes.
+std::vector<std::uint8_t> unseen_types(const VoxelRegistry& types) {
+  std::vector<std::uint8_t> is_unseen(types.size());
+  for (std::size_t i = 0; i < types.size(); ++i) {
+    const auto type = static_cast<VoxelType>(i);
+    is_unseen[i] = types.is_shaped(type) && is_only_glass(types[type]) ? 1 : 0;
+  }
+  return is_unseen;
+}
+
+// Returns the voxels of a row that shapes touch which a flag per type does not leave out.
+std::uint64_t row_without(const std::vector<std::uint8_t>& is_left_out, const ShapeIndex& index, IVec3 first) {
+  std::uint64_t row = 0;
+  for (std::uint64_t left = index.touched_row(first); left != 0; left &= left - 1) {
+    const int x = std::countr_zero(left);
+    const auto counts = [&](const ListedShape& shape) {
+      return shape.type >= is_left_out.size() || is_left_out[shape.type] == 0;
+    };
+    if (std::ranges::any_of(index.at(first + IVec3(x, 0, 0)).listed(), counts)) row |= std::uint64_t{1} << x;
+  }
+  return row;
+}
+
 // Returns the voxels of a row that shapes with glass touch.
 std::uint64_t glass_row(const TracedShapes& shapes, IVec3 first) {
   std::uint64_t row = 0;
@@ -58,11 +90,11 @@ std::uint64_t glass_row(const TracedShapes& shapes, IVec3 first) {
   return row;
 }
 
-// Rows of the voxels that are opaque or that shapes touch. Remembers the rows around the last one.
+// Rows of the voxels that are opaque or that shapes with visible parts touch. Remembers the rows around the last one.
 class OpaqueRows {
  public:
   OpaqueRows(const Grid& grid, const VoxelRegistry& types, const TracedShapes& shapes)
-      : grid_(grid), types_(types), shapes_(shapes) {}
+      : grid_(grid), types_(types), shapes_(shapes), is_unseen_(unseen_types(types)) {}
   std::uint64_t operator()(IVec3 first) {
     const IVec3 chunk = chunk_of(first);
     const IVec3 local = local_of(first);
@@ -73,7 +105,8 @@ class OpaqueRows {
       rows_.reset();
       if (const Chunk* const voxels = grid_.find_chunk(chunk)) rows_.emplace(*voxels, types_, Occupancy::Opaque);
     }
-    if (!rows_) return shapes_.index.touched_row(first);
+    const std::uint64_t touched = row_without(is_unseen_, shapes_.index, first);
+    if (!rows_) return touched;
     const IVec3 slab{0, local.y & ~3, local.z & ~3};
     if (slab != slab_) {
       slab_ = slab;
@@ -82,13 +115,14 @@ class OpaqueRows {
       if (kind == trace::Slab::Full) slab_rows_.fill(~std::uint64_t{0});
     }
     const std::uint64_t opaque = slab_rows_[static_cast<std::size_t>((local.y & 3) + 4 * (local.z & 3))];
-    return opaque | shapes_.index.touched_row(first);
+    return opaque | touched;
   }
 
  private:
   const Grid& grid_;
   const VoxelRegistry& types_;
   const TracedShapes& shapes_;
+  std::vector<std::uint8_t> is_unseen_;  // by type
   bool is_begun_ = false;
   IVec3 chunk_{0};
   IVec3 slab_{-1};

@@ -64,7 +64,9 @@ class SplitField {
 struct TracedShapes {
   ShapeIndex index;
   OccupancyTree touched;  ///< the voxels that shapes touch, also air: their own, and those that they reach into
-  OccupancyTree solid;    ///< the same and all opaque voxels, so that a ray finds the first of both at once
+  /// All opaque voxels, and those that shapes with visible parts touch (ShapeParts::Visible), so that a ray finds the
+  /// first of both at once.
+  OccupancyTree solid;
   /// The voxels that shapes with glass touch: without textures or with translucent ones, of transparent types. Empty if
   /// there are none.
   OccupancyTree glass;
