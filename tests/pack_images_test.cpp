@@ -194,6 +194,7 @@ class SolidTexels final : public packs::PackFiles {
     if (!png) return png.error();
     return std::optional(std::move(*png));
   }
+  [[nodiscard]] std::string identity() const override { return shows_alpha_ ? "alpha" : "solid"; }
 
  private:
   static constexpr std::uint8_t kOracleClear = 2;  // of 255: deepslate discards less than 0.01
