@@ -257,7 +257,7 @@ TEST(StateTurns, CopiesHaveTheTurnedShapesOfBlocks) {
 }
 
 TEST(StateTurns, WithoutThemCopiesDiffer) {
-  // The twin of the test above: copies by orientations alone keep the states of fences and doors.
+  // Copies by orientations alone keep the states of fences and doors.
   const Garden garden = garden_of_blocks();
   const AxisOrientation turn = AxisOrientation::quarter_turns(1, 1);
   const CopyOptions options{.types = &garden.scene.types};

@@ -3,8 +3,8 @@
 //   open            opens the file
 //   looks/N         opens it and gives N types their looks; the texels stay compressed
 //   texels/N        decodes the textures of N types, as an image does that shows all of them
-// packs/builtin/400 gives 412 blocks of the game, in all colours and woods, the looks of Quoin's own pack: the time by
-//                   which packs delay the first image of such a world
+// packs/builtin/400 gives 412 blocks of the game, in all colours and woods, the looks of Quoin's own pack: packs delay
+//                   the first image of such a world by this time
 // packs/jar/read    a .jar of 30 MB with 8,000 class files: opens it and reads 300 files of its pack
 //
 // All threads of the machine. Counters: peak_mb, the largest memory of the process during the work; kept_mb, after the

@@ -291,7 +291,7 @@ TEST(NodeFolder, FindsTilesByTheirNames) {
   game.put("mods/pack/extra/textures/more/extra_box_top.png", plain_png(green));
   game.put("mods/pack/extra/textures/extra_box.png", plain_png(blue));
   game.put("mods/default/textures/default_wood.png", plain_png(green, 64));
-  game.put("mods/default/pictures/default_dirt.png", plain_png(red));
+  game.put("mods/default/drawings/default_dirt.png", plain_png(red));
   const VoxelProperties stone = shown_node("default:stone", {game.path}, false);
   EXPECT_EQ(node_face_colour(stone, Direction::PosX), red);
   const VoxelProperties box = shown_node("extra:box", {game.path}, false);

@@ -780,7 +780,7 @@ TEST(PackChoices, TooManyAreNamed) {
   EXPECT_EQ(report_of(pack, bush.type).without_choices, 1U) << "more than 64 parts";
 }
 
-TEST(PackLooks, TheFirstVariantWins) {
+TEST(PackLooks, UsesTheFirstVariant) {
   PackBuilder pack = small_pack();
   for (const int height : {1, 2, 3}) pack.model("block/h" + std::to_string(height), box_of_height(height));
   // The variant without properties shows in all states without another one; overlapping variants do not add up.
