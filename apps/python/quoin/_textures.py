@@ -127,7 +127,8 @@ def orientation_matrix(orientation: int) -> NdArray:
     number = _c.whole(orientation, "orientation", 0, 47)
     rows = ((0, 1, 2), (1, 2, 0), (2, 0, 1), (1, 0, 2), (0, 2, 1), (2, 1, 0))[number // 8]
     signs = [-1 if number >> axis & 1 else 1 for axis in range(3)]
-    return np.eye(3, dtype=np.int64)[list(rows)] * np.array(signs)[:, None]
+    matrix: NdArray = np.eye(3, dtype=np.int64)[list(rows)] * np.array(signs)[:, None]
+    return matrix
 
 
 class Textures:

@@ -1,6 +1,8 @@
 #include "io/minecraft/block_looks.h"
 
 #include <algorithm>
+#include <array>
+#include <initializer_list>
 
 namespace quoin::minecraft {
 
@@ -295,6 +297,44 @@ Rgba8 tinted_colour(Rgba8 colour, std::uint32_t tint) {
     return static_cast<std::uint8_t>((part * (tint >> shift & 255U) + 127U) / 255U);
   };
   return {times(colour.r, 16), times(colour.g, 8), times(colour.b, 0), colour.a};
+}
+
+NamedTint tint_of_block(std::string_view name) {
+  constexpr BiomeTints kPlains{};
+  const auto has_any = [&](std::initializer_list<std::string_view> words) {
+    return std::ranges::any_of(words, [&](std::string_view word) { return name.find(word) != std::string_view::npos; });
+  };
+  if (name == "spruce_leaves") return {0x619961};
+  if (name == "birch_leaves") return {0x80A755};
+  if (name == "lily_pad") return {0x208030};
+  if (name.starts_with("attached_") && name.ends_with("_stem")) return {0xE0C71C};
+  if (has_any({"water", "bubble_column"})) return {kPlains.water, Tint::Water};
+  if (has_any({"leaves", "vine"})) return {kPlains.foliage, Tint::Foliage};
+  if (has_any({"grass", "fern", "sugar_cane", "petals", "wildflowers", "bush"})) return {kPlains.grass, Tint::Grass};
+  return {};
+}
+
+const StateTint* state_tint_of(std::string_view name) {
+  static constexpr StateTint kWire{
+      "power",
+      [](int power) {
+        constexpr std::array<int, 16> kGroups = {0, 1, 1, 4, 4, 4, 7, 7, 7, 10, 10, 10, 13, 13, 13, 15};
+        return kGroups[static_cast<std::size_t>(std::clamp(power, 0, 15))];
+      },
+      [](int power) {
+        const float share = static_cast<float>(power) / 15.0F;
+        const auto byte = [](float unit) { return static_cast<std::uint8_t>(std::clamp(unit, 0.0F, 1.0F) * 255.0F); };
+        return Rgba8{byte(share * 0.6F + (power > 0 ? 0.4F : 0.3F)), byte(share * share * 0.7F - 0.5F),
+                     byte(share * share * 0.6F - 0.7F)};
+      }};
+  static constexpr StateTint kStem{"age", [](int age) { return std::clamp(age, 0, 7); },
+                                   [](int age) {
+                                     return Rgba8{static_cast<std::uint8_t>(age * 32),
+                                                  static_cast<std::uint8_t>(255 - age * 8),
+                                                  static_cast<std::uint8_t>(age * 4)};
+                                   }};
+  if (name == "redstone_wire") return &kWire;
+  return name == "melon_stem" || name == "pumpkin_stem" ? &kStem : nullptr;
 }
 
 }  // namespace quoin::minecraft

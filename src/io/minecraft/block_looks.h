@@ -54,6 +54,27 @@ enum class Tint : std::uint8_t { None, Grass, Foliage, Water };
 /// Returns a colour multiplied by the tint; alpha is unchanged.
 [[nodiscard]] Rgba8 tinted_colour(Rgba8 colour, std::uint32_t tint);
 
+/// A colour of tinted faces that does not depend on the state, and the biome colour that it is.
+struct NamedTint {
+  std::uint32_t rgb = 0xFFFFFF;
+  Tint kind = Tint::None;
+};
+
+/// Returns the tint of a block's faces, in the biome plains. `name`: without a namespace. White for untinted blocks.
+/// Source: the Minecraft Wiki, "Block colors" and "Color" (https://minecraft.wiki/w/Block_colors).
+[[nodiscard]] NamedTint tint_of_block(std::string_view name);
+
+/// A tint by a number in the state: the power of wires, the age of stems. Near powers have one colour, since a type has
+/// few parts.
+struct StateTint {
+  std::string_view property;
+  int (*group)(int value) = nullptr;  ///< returns the value whose colour stands for it
+  Rgba8 (*colour)(int value) = nullptr;
+};
+
+/// Returns the tint by state of a block; null if it has none. `name`: without a namespace. Source: as tint_of_block.
+[[nodiscard]] const StateTint* state_tint_of(std::string_view name);
+
 /// The source of a block's look.
 enum class Knowledge : std::uint8_t {
   Table,    ///< the block is in the table, or is a shape of such a block

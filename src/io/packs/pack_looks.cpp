@@ -41,32 +41,9 @@ bool has_any(std::string_view name, std::initializer_list<std::string_view> word
   return std::ranges::any_of(words, [&](std::string_view word) { return name.find(word) != std::string_view::npos; });
 }
 
-/// A colour of tinted faces that does not depend on the state, and the biome colour that it is.
-struct NamedTint {
-  std::uint32_t rgb = 0xFFFFFF;
-  minecraft::Tint kind = minecraft::Tint::None;
-};
-
-/// Source: the Minecraft Wiki, "Block colors" and "Color" (https://minecraft.wiki/w/Block_colors).
-NamedTint tint_of(const VoxelProperties& type, std::string_view name) {
-  using minecraft::Tint;
-  constexpr minecraft::BiomeTints kPlains{};
-  NamedTint tint;
-  if (name == "spruce_leaves") {
-    tint = {0x619961};
-  } else if (name == "birch_leaves") {
-    tint = {0x80A755};
-  } else if (name == "lily_pad") {
-    tint = {0x208030};
-  } else if (name.starts_with("attached_") && name.ends_with("_stem")) {
-    tint = {0xE0C71C};
-  } else if (has_any(name, {"water", "bubble_column"})) {
-    tint = {kPlains.water, Tint::Water};
-  } else if (has_any(name, {"leaves", "vine"})) {
-    tint = {kPlains.foliage, Tint::Foliage};
-  } else if (has_any(name, {"grass", "fern", "sugar_cane", "petals", "wildflowers", "bush"})) {
-    tint = {kPlains.grass, Tint::Grass};
-  }
+/// Returns the tint of a type's faces: the one of its name, in the colour that the importer found.
+minecraft::NamedTint tint_of(const VoxelProperties& type, std::string_view name) {
+  minecraft::NamedTint tint = minecraft::tint_of_block(name);
   if (const auto found = type.attributes.find(minecraft::kTintColourAttribute); found != type.attributes.end()) {
     const std::string& digits = found->second;
     std::uint32_t rgb = 0;
@@ -74,37 +51,6 @@ NamedTint tint_of(const VoxelProperties& type, std::string_view name) {
     if (error == std::errc() && end == digits.data() + digits.size()) tint.rgb = rgb;
   }
   return tint;
-}
-
-/// A tint by a number in the state: the power of wires, the age of stems. Near powers have one colour, since a type has
-/// few parts.
-struct StateTint {
-  std::string_view property;
-  int (*group)(int value) = nullptr;  ///< returns the value whose colour stands for it
-  Rgba8 (*colour)(int value) = nullptr;
-};
-
-const StateTint* state_tint_of(std::string_view name) {
-  static constexpr StateTint kWire{
-      "power",
-      [](int power) {
-        constexpr std::array<int, 16> kGroups = {0, 1, 1, 4, 4, 4, 7, 7, 7, 10, 10, 10, 13, 13, 13, 15};
-        return kGroups[static_cast<std::size_t>(std::clamp(power, 0, 15))];
-      },
-      [](int power) {
-        const float share = static_cast<float>(power) / 15.0F;
-        const auto byte = [](float unit) { return static_cast<std::uint8_t>(std::clamp(unit, 0.0F, 1.0F) * 255.0F); };
-        return Rgba8{byte(share * 0.6F + (power > 0 ? 0.4F : 0.3F)), byte(share * share * 0.7F - 0.5F),
-                     byte(share * share * 0.6F - 0.7F)};
-      }};
-  static constexpr StateTint kStem{"age", [](int age) { return std::clamp(age, 0, 7); },
-                                   [](int age) {
-                                     return Rgba8{static_cast<std::uint8_t>(age * 32),
-                                                  static_cast<std::uint8_t>(255 - age * 8),
-                                                  static_cast<std::uint8_t>(age * 4)};
-                                   }};
-  if (name == "redstone_wire") return &kWire;
-  return name == "melon_stem" || name == "pumpkin_stem" ? &kStem : nullptr;
 }
 
 /// A model that a type shows, and when.
@@ -251,7 +197,7 @@ class BlockLooks::Maker {
 
   /// Returns the tint of faces by the packs' colour maps.
   [[nodiscard]] Rgba8 tint() const {
-    const NamedTint named = tint_of(type_, name_);
+    const minecraft::NamedTint named = tint_of(type_, name_);
     return minecraft::colour_of_rgb(looks_.tint_by_maps(named.kind, named.rgb));
   }
 
@@ -384,7 +330,7 @@ class BlockLooks::Maker {
       note_model(state.model, model ? std::string("no such model") : to_string(model.error()));
       return;
     }
-    const StateTint* const by_state = state_tint_of(name_);
+    const minecraft::StateTint* const by_state = minecraft::state_tint_of(name_);
     const minecraft::StateField* const field = by_state == nullptr ? nullptr : states_.field(by_state->property);
     if (field == nullptr || !has_tinted_face(**model)) {
       add_outcome(state, colour, std::move(when), *model);
@@ -407,7 +353,7 @@ class BlockLooks::Maker {
   }
 
   /// Adds an outcome per colour of a tint that the state selects.
-  void add_by_state(const StateTint& tint, const minecraft::StateField& field, const StateModel& state,
+  void add_by_state(const minecraft::StateTint& tint, const minecraft::StateField& field, const StateModel& state,
                     const std::vector<ShapeCondition>& when, const std::shared_ptr<const BlockModel>& model) {
     const std::uint32_t mask = mask_of(field);
     constexpr std::uint32_t kValues = 16;
