@@ -150,6 +150,17 @@ std::uint32_t fluid_groups_of(const VoxelProperties& p) {
   return p.shapes.rules().groups;
 }
 
+// Calls `visit(type)` for each type whose voxels can contain a fluid of any of these groups (ShapeRules::fluid). Cost:
+// O(types), O(1) without groups.
+void for_each_holder(const std::vector<VoxelProperties>& types, std::uint32_t groups,
+                     FunctionRef<void(VoxelType type)> visit) {
+  for (std::size_t type = 1; groups != 0 && type < types.size(); ++type) {
+    const VoxelShapes& shapes = types[type].shapes;
+    if (shapes.empty() || !shapes.rules().fluid || (shapes.rules().fluid->groups & groups) == 0) continue;
+    visit(static_cast<VoxelType>(type));
+  }
+}
+
 // As ==, but NaN equals itself. Otherwise each lookup would add a type.
 bool is_same(const VoxelProperties& a, const VoxelProperties& b) {
   if (a == b) return true;
@@ -330,11 +341,19 @@ Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   if (is_turned) ++c.turned_count;
   c.fluid_groups.push_back(fluid_groups_of(properties));
   if (c.fluid_groups.back() != 0) ++c.fluid_count;
-  if (c.fluid_groups.back() != 0) c.find_first_fluids();
+  std::uint32_t first_of = 0;  // groups that had no fluid
+  for (std::uint32_t left = c.fluid_groups.back(); left != 0; left &= left - 1) {
+    VoxelType& first = c.first_fluid_of[static_cast<std::size_t>(std::countr_zero(left))];
+    if (first != kAir) continue;
+    first = type;
+    first_of |= left & (~left + 1);
+  }
   c.properties.push_back(std::move(properties));
   if (visibility == Visibility::Transparent) ++c.transparent_count;
   if (occlusion != visibility) ++c.unoccluding_count;
   note({type, occlusion != Visibility::Opaque, true, is_shaped || is_turned});
+  // Voxels that contain a fluid show it by its type, which no voxel may have.
+  for_each_holder(c.properties, first_of, [&](VoxelType holder) { note({holder, false, false, true}); });
   return type;
 }
 
@@ -423,13 +442,16 @@ void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
       !(c.properties[type].colour == properties.colour && c.properties[type].faces == properties.faces &&
         c.properties[type].field_textures == properties.field_textures);
   const std::uint32_t groups = fluid_groups_of(properties);
-  if (const std::uint32_t had = std::exchange(c.fluid_groups[type], groups); had != groups) {
+  const std::uint32_t had = std::exchange(c.fluid_groups[type], groups);
+  if (had != groups) {
     c.fluid_count += std::size_t{groups != 0} - std::size_t{had != 0};
     c.find_first_fluids();
   }
   const TypeChange change{type, is_seen_otherwise, is_coloured_otherwise, is_formed_otherwise};
   c.properties[type] = std::move(properties);
   note(change);
+  if (!is_seen_otherwise && !is_coloured_otherwise && !is_formed_otherwise) return;
+  for_each_holder(c.properties, had | groups, [&](VoxelType holder) { note({holder, false, false, true}); });
 }
 
 ChangeCursor VoxelRegistry::cursor() const {

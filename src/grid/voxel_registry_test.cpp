@@ -1,6 +1,11 @@
 #include <quoin/grid/voxel_registry.h>
 
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -90,6 +95,97 @@ TEST(VoxelRegistry, KnowsTypesWhoseDataChangesMeshes) {
   EXPECT_TRUE(types.remeshes_on_data(*stone) && !types.remeshes_on_data(*door));
   types.replace(*stone, {.name = "stone"});
   EXPECT_FALSE(types.has_remesh_on_data());
+}
+
+VoxelProperties fluid_named(const char* name, std::uint32_t groups) {
+  return {.name = name,
+          .visibility = Visibility::Transparent,
+          .shapes = *VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid, .groups = groups})};
+}
+
+TEST(VoxelRegistry, KnowsTheFirstFluidOfEachGroup) {
+  VoxelRegistry types;
+  EXPECT_EQ(types.first_fluid(~0U), kAir);
+  ASSERT_TRUE(types.add({.name = "stone"}));
+  const VoxelType sea = *types.add(fluid_named("sea", 2));
+  const VoxelType oil = *types.add(fluid_named("oil", 4));
+  const VoxelType lake = *types.add(fluid_named("lake", 2));
+  EXPECT_EQ(types.first_fluid(2), sea);
+  EXPECT_EQ(types.first_fluid(4), oil);
+  EXPECT_EQ(types.first_fluid(6), sea);
+  EXPECT_EQ(types.first_fluid(1), kAir);
+  const VoxelRegistry copy = types;
+  types.replace(sea, {.name = "ice"});
+  EXPECT_EQ(types.first_fluid(2), lake);
+  EXPECT_EQ(types.fluid_groups(sea), 0U);
+  EXPECT_EQ(copy.first_fluid(2), sea);
+  types.replace(lake, {.name = "ice"});
+  EXPECT_EQ(types.first_fluid(6), oil);
+  types.replace(oil, {.name = "ice"});
+  EXPECT_FALSE(types.has_fluids());
+  EXPECT_EQ(types.first_fluid(~0U), kAir);
+}
+
+TEST(VoxelRegistry, ReportsTypesThatContainAChangedFluid) {
+  VoxelRegistry types;
+  const auto shapes_with = [](std::uint32_t groups) {
+    ShapeRules rules{.parts = {{.shape = VoxelShape::box({0, 0, 0}, {16, 8, 16})}}};
+    rules.fluid = ContainedFluid{.groups = groups};
+    return *VoxelShapes::from_rules(std::move(rules));
+  };
+  const VoxelProperties water = fluid_named("water", 2);
+  const VoxelType wet = *types.add({.name = "wet slab", .shapes = shapes_with(2)});
+  ASSERT_TRUE(types.add({.name = "slab in oil", .shapes = shapes_with(4)}));
+  ASSERT_TRUE(types.add({.name = "dry slab", .shapes = VoxelShape::box({0, 0, 0}, {16, 8, 16})}));
+  ChangeCursor cursor = types.cursor();
+  const auto changed = [&] {
+    const TypeChanges changes = types.changes_since(cursor);
+    std::vector<VoxelType> with_other_shapes;
+    for (const TypeChange& change : changes.items_unless_all()) {
+      if (change.shape_changed) with_other_shapes.push_back(change.type);
+    }
+    return with_other_shapes;
+  };
+  const VoxelType first = *types.add(water);
+  EXPECT_EQ(changed(), (std::vector{wet, first}));
+  VoxelProperties other = water;
+  other.name = "brine";
+  const VoxelType second = *types.add(other);
+  EXPECT_EQ(changed(), std::vector{second}) << "not the first one";
+  other = water;
+  other.roughness = 0.5F;
+  types.replace(first, other);
+  EXPECT_EQ(changed(), std::vector<VoxelType>{}) << "it has the same models";
+  other.colour = {1, 2, 3, 90};
+  types.replace(first, other);
+  EXPECT_EQ(changed(), std::vector{wet});
+  types.replace(first, {.name = "ice"});
+  EXPECT_EQ(changed(), (std::vector{wet, first}));
+  types.replace(first, water);
+  EXPECT_EQ(changed(), (std::vector{wet, first}));
+}
+
+// Adds types that differ in their names. Returns the time in seconds.
+double seconds_to_add(VoxelProperties type, int count) {
+  VoxelRegistry types;
+  const auto start = std::chrono::steady_clock::now();
+  for (int i = 0; i < count; ++i) {
+    type.name = std::to_string(i);
+    EXPECT_TRUE(types.add(type));
+  }
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+TEST(VoxelRegistry, AddsFluidsAsFastAsOtherTypes) {
+  const VoxelProperties fluid = fluid_named("", 1U << 31);
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 3; ++i) {
+    const double plain = seconds_to_add({.shapes = VoxelShape::box({0, 0, 0}, {16, 8, 16})}, 60'000);
+    const double ratio = seconds_to_add(fluid, 60'000) / plain;
+    least = std::min(least, ratio);
+    RecordProperty("ratio", std::to_string(ratio));
+  }
+  EXPECT_LT(least, 4.0);
 }
 
 TEST(VoxelRegistry, RoundTripsColours) {

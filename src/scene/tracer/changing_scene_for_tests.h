@@ -26,7 +26,8 @@ namespace quoin {
 class ChangingScene {
  public:
   /// `has_fields`: some changes edit fields, or load and unload chunks of partial grids.
-  /// `has_shapes`: some types have shapes, which their state selects, and some changes edit states.
+  /// `has_shapes`: some types have shapes, which their state selects, or are fluids, which shapes contain, and some
+  /// changes edit states.
   explicit ChangingScene(unsigned seed, bool has_fields = false, bool has_shapes = false)
       : has_fields_(has_fields), has_shapes_(has_shapes), random_(seed) {
     for (int i = 0; i < 3; ++i) EXPECT_TRUE(scene.types.add(properties()).has_value());
@@ -82,6 +83,11 @@ class ChangingScene {
     if (!has_shapes_) return properties;
     properties.state_bits = 2;
     if (below(3) == 0) return properties;
+    if (below(4) == 0) {
+      properties.visibility = Visibility::Transparent;
+      properties.shapes = *VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid, .groups = 1U << below(2)});
+      return properties;
+    }
     properties.orientations = StateOrientations::about_y();
     const auto box = [](IVec3 lower, IVec3 upper) { return ShapePart{.shape = VoxelShape::box(lower, upper)}; };
     ShapeRules rules{.parts = {box({0, 0, 0}, {16, 4 + 4 * below(3), 8})}};
@@ -89,6 +95,9 @@ class ChangingScene {
       rules.parts.push_back({.shape = *VoxelShape::from_elements({{.min = {-6, 2, 6}, .max = {0, 20, 10}}})});
       rules.neighbours = ShapeNeighbours::Connected;
       rules.parts.back().when = {{.connected = {Direction::PosX}}};
+    }
+    if (below(2) == 0) {
+      rules.fluid = ContainedFluid{.groups = 1U << below(2), .when = {{.state_mask = 1, .state = 1}}};
     }
     properties.shapes = *VoxelShapes::from_rules(std::move(rules));
     return properties;

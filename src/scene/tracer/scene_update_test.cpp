@@ -134,6 +134,41 @@ TEST(SceneUpdate, ShapesFollowEditsStatesAndTypes) {
   EXPECT_GT(counts.shapes, 100);
 }
 
+// A wet slab shows a fluid that no voxel of its grid is of.
+TEST(SceneUpdate, ContainedFluidsFollowTheirTypes) {
+  Scene scene;
+  const VoxelProperties of_sea{.name = "sea",
+                               .visibility = Visibility::Transparent,
+                               .state_bits = 4,
+                               .shapes = *VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid, .groups = 2})};
+  ShapeRules rules{.parts = {{.shape = VoxelShape::box({0, 0, 0}, {16, 8, 16})}}};
+  rules.fluid = ContainedFluid{.groups = 2};
+  const VoxelType slab = *scene.types.add({.name = "slab", .shapes = *VoxelShapes::from_rules(std::move(rules))});
+  SceneGrid placed;
+  placed.grid.set({0, 0, 0}, slab);
+  const GridHandle handle = scene.add_grid(std::move(placed));
+  scene.add_instance({.grid = handle});
+  SceneTracer tracer(scene);
+  TracerCounts counts;
+  const auto shapes_at = [&](IVec3 voxel) {
+    tracer.update();
+    expect_same_placed(tracer, SceneTracer(scene), false, counts);
+    return placed_in(tracer)[0].shapes->index.at(voxel).size();
+  };
+  EXPECT_EQ(shapes_at({0, 0, 0}), 1U) << "there is no fluid";
+  const VoxelType sea = *scene.types.add(of_sea);
+  EXPECT_EQ(shapes_at({0, 0, 0}), 2U) << "the first fluid of its groups came";
+  scene.types.replace(sea, {.name = "ice"});
+  EXPECT_EQ(shapes_at({0, 0, 0}), 1U) << "the fluid became another type";
+  // Another chunk changes. Nothing remembers the models of the former type, which are gone.
+  scene.edit(handle).grid.set({300, 0, 0}, slab);
+  EXPECT_EQ(shapes_at({0, 0, 0}), 1U);
+  EXPECT_EQ(shapes_at({300, 0, 0}), 1U);
+  scene.types.replace(sea, of_sea);
+  EXPECT_EQ(shapes_at({300, 0, 0}), 2U);
+  EXPECT_GT(counts.shapes, 4);
+}
+
 TEST(SceneUpdate, OnlyGridsWithShapesHaveIndex) {
   TwoCubes world;
   SceneTracer tracer(world.scene);
