@@ -514,7 +514,7 @@ TEST(SceneData, KeepsOrientationsAndShapes) {
                                .shapes = *VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid})}));
   ASSERT_TRUE(scene.types.add({.name = "slab", .blocks_light = false, .shapes = VoxelShape::crossed_plates(12)}));
   const std::string text = text_of(scene);
-  EXPECT_NE(text.find("\"quoin_scene\": 9"), std::string::npos);
+  EXPECT_NE(text.find("\"quoin_scene\": 10"), std::string::npos);
   std::size_t textures = 0;
   for (std::size_t at = 0; (at = text.find("\"texels\"", at)) != std::string::npos; ++at) ++textures;
   EXPECT_EQ(textures, 3U) << "each texture once";
@@ -539,6 +539,24 @@ TEST(SceneData, KeepsOrientationsAndShapes) {
       EXPECT_EQ(again->scene.types[type], scene.types[type]) << name << " " << scene.types[type].name;
     }
   }
+}
+
+TEST(SceneData, OnlyNewPartsOfShapesNeedVersionTen) {
+  const auto version_with = [](ShapeCondition when, std::optional<ContainedFluid> fluid) {
+    Scene scene = scene_of(Grid());
+    ShapeRules rules{.parts = {{.shape = VoxelShape::box({0, 0, 0}, {16, 8, 16}), .when = {std::move(when)}}}};
+    rules.fluid = std::move(fluid);
+    EXPECT_TRUE(scene.types.add({.name = "slab", .shapes = *VoxelShapes::from_rules(std::move(rules))}));
+    const std::string text = text_of(scene);
+    EXPECT_TRUE(read(text));
+    const std::string key = "\"quoin_scene\": ";
+    const std::size_t at = text.find(key) + key.size();
+    return text.substr(at, text.find(',', at) - at);
+  };
+  const ShapeCondition to_east{.connected = {Direction::PosX}};
+  EXPECT_EQ(version_with(to_east, {}), "9");
+  EXPECT_EQ(version_with({.positions = {4, 0, 1}}, {}), "10");
+  EXPECT_EQ(version_with(to_east, ContainedFluid{.groups = 2}), "10");
 }
 
 TEST(SceneData, RefusesInvalidShapesWithTheirPosition) {

@@ -40,6 +40,7 @@ class SceneText {
         is_eighth_ |= !properties.faces.empty();
         is_ninth_ |= !properties.orientations.empty() || !properties.shapes.empty() ||
                      !(properties.field_textures == FieldTextures{});
+        is_tenth_ |= are_of_tenth(properties.shapes);
       }
       for (std::size_t i = 0; i < scene.grids.size(); ++i) {
         put_grid(scene.grids[i], pieces.voxels[i], pieces.densities[i], pieces.data[i]);
@@ -92,11 +93,21 @@ class SceneText {
     text += entries.empty() ? "]" : "\n  ]";
   }
 
+  // Returns true if shapes have shares of positions or contain a fluid, which readers of version 9 do not know.
+  [[nodiscard]] static bool are_of_tenth(const VoxelShapes& shapes) {
+    if (shapes.empty()) return false;
+    const auto has_share = [](const ShapeCondition& when) { return !(when.positions == PositionShare{}); };
+    return shapes.rules().fluid.has_value() || std::ranges::any_of(shapes.rules().parts, [&](const ShapePart& part) {
+             return std::ranges::any_of(part.when, has_share);
+           });
+  }
+
   [[nodiscard]] std::string text_of(const SceneFile& scene) const {
     const bool has_models = !types_.empty() || !grids_.empty();
     const bool is_fourth = !layers_.empty() || !groups_.empty();
     std::string text = "{\n  \"quoin_scene\": ";
-    const bool is_tenth = std::ranges::any_of(scene.sources, [](const auto& source) { return !source.packs.empty(); });
+    const bool is_tenth =
+        is_tenth_ || std::ranges::any_of(scene.sources, [](const auto& source) { return !source.packs.empty(); });
     text += is_tenth                                                 ? "10"
             : is_ninth_                                              ? "9"
             : is_eighth_                                             ? "8"
@@ -142,6 +153,7 @@ class SceneText {
   bool is_seventh_ = false;
   bool is_eighth_ = false;
   bool is_ninth_ = false;
+  bool is_tenth_ = false;
 };
 
 Status check_types(const SceneFile& scene) {
