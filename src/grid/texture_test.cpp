@@ -88,6 +88,21 @@ TEST(DeferredTexture, MakesTexelsWhenTheyAreFirstRead) {
   EXPECT_EQ(texture, eager);
 }
 
+TEST(DeferredTexture, ComparisonsKeepNoTexels) {
+  const auto deferred = [](const AlphaImage& image) {
+    return Texture::deferred("t", image, [image] { return image; }).value();
+  };
+  const AlphaImage image = noise(16, 5, true);
+  const Texture one = deferred(image);
+  const Texture same = deferred(image);
+  EXPECT_EQ(one, same);
+  EXPECT_EQ(one, texture_of(image));
+  EXPECT_EQ(texture_of(image), one);
+  EXPECT_FALSE(one == deferred(noise(16, 6, true)));
+  EXPECT_FALSE(one == texture_of(noise(32, 5, true)));
+  EXPECT_FALSE(one.has_texels() || same.has_texels());
+}
+
 TEST(DeferredTexture, AreDecodedForAllTypesAtOnce) {
   VoxelRegistry types;
   std::atomic<int> decoded = 0;
