@@ -571,10 +571,12 @@ Status VoxelShapes::Content::add_positions() {
     }
   }
   if (position_count == 1) return {};
-  std::map<std::vector<bool>, std::uint16_t> classes;  // by the shares that have a position
+  std::map<std::vector<std::uint64_t>, std::uint16_t> classes;  // by the shares that have a position: a bit each
   for (std::uint32_t position = 0; position < position_count; ++position) {
-    std::vector<bool> in(shares.size());
-    for (std::size_t i = 0; i < shares.size(); ++i) in[i] = has_position(shares[i], position);
+    std::vector<std::uint64_t> in((shares.size() + 63) / 64);
+    for (std::size_t i = 0; i < shares.size(); ++i) {
+      in[i / 64] |= std::uint64_t{has_position(shares[i], position)} << i % 64;
+    }
     const auto [found, is_new] = classes.emplace(std::move(in), static_cast<std::uint16_t>(classes.size()));
     if (is_new) position_of_class.push_back(static_cast<std::uint16_t>(position));
     class_of_position.push_back(found->second);
@@ -632,7 +634,10 @@ Result<VoxelShapes> VoxelShapes::from_rules(ShapeRules rules) {
     return make_error(ErrorCode::InvalidArgument, "cannot use the shapes of a type: " + reason);
   };
   if (rules.neighbours > ShapeNeighbours::Fluid) return wrong("unknown use of neighbours");
-  if (rules.neighbours == ShapeNeighbours::Fluid && rules.groups == 0) return wrong("a fluid has no group");
+  // Fluids of one kind are one body. With several groups, two kinds could both join a third one.
+  if (rules.neighbours == ShapeNeighbours::Fluid && !std::has_single_bit(rules.groups)) {
+    return wrong(rules.groups == 0 ? "a fluid has no group" : "a fluid has more than one group");
+  }
   if (rules.parts.empty() && rules.neighbours != ShapeNeighbours::Fluid) return wrong("there is no part");
   if (rules.parts.size() > kMaxShapeParts) return wrong("more than " + std::to_string(kMaxShapeParts) + " parts");
   auto content = std::make_shared<Content>();
@@ -648,7 +653,10 @@ Result<VoxelShapes> VoxelShapes::from_rules(ShapeRules rules) {
   if (elements > 4 * kMaxShapeElements)
     return wrong("more than " + std::to_string(4 * kMaxShapeElements) + " elements");
   if (rules.fluid) {
-    if (rules.fluid->groups == 0) return wrong("the fluid that voxels contain has no group");
+    if (!std::has_single_bit(rules.fluid->groups)) {
+      const std::string fluid = "the fluid that voxels contain has ";
+      return wrong(fluid + (rules.fluid->groups == 0 ? "no group" : "more than one group"));
+    }
     if (rules.neighbours == ShapeNeighbours::Fluid) return wrong("a fluid contains a fluid");
     for (const ShapeCondition& condition : rules.fluid->when) {
       if (condition.corner || !condition.connected.empty() || !condition.unconnected.empty()) {

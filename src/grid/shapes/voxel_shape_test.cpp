@@ -1,10 +1,12 @@
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <map>
 #include <random>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -431,7 +433,7 @@ VoxelProperties wet_slab(std::uint32_t groups) {
 
 TEST(ShapeAt, FluidsOfOneKindJoinAndHideTheirFaces) {
   VoxelRegistry types;
-  const VoxelType lake = *types.add(fluid_of("lake", 6));
+  const VoxelType lake = *types.add(fluid_of("lake", 2));
   const VoxelType sea = *types.add(fluid_of("sea", 2, 90));
   const VoxelType oil = *types.add(fluid_of("oil", 8));
   Grid grid;
@@ -451,26 +453,6 @@ TEST(ShapeAt, FluidsOfOneKindJoinAndHideTheirFaces) {
   EXPECT_EQ(at(1)->max.y, 1.0F) << "as high as the full voxel next to it";
   grid.set({0, 1, 0}, oil);
   EXPECT_FALSE(at(0)->is_full);
-}
-
-TEST(ShapeAt, RegistryKnowsTheFirstFluidOfEachGroup) {
-  VoxelRegistry types;
-  EXPECT_EQ(types.first_fluid(~0U), kAir);
-  ASSERT_TRUE(types.add({.name = "stone"}));
-  const VoxelType sea = *types.add(fluid_of("sea", 2));
-  const VoxelType both = *types.add(fluid_of("both", 6));
-  EXPECT_EQ(types.first_fluid(2), sea);
-  EXPECT_EQ(types.first_fluid(4), both);
-  EXPECT_EQ(types.first_fluid(6), sea);
-  EXPECT_EQ(types.first_fluid(1), kAir);
-  const VoxelRegistry copy = types;
-  types.replace(sea, {.name = "ice"});
-  EXPECT_EQ(types.first_fluid(2), both);
-  EXPECT_EQ(types.fluid_groups(sea), 0U);
-  EXPECT_EQ(copy.first_fluid(2), sea);
-  types.replace(both, {.name = "ice"});
-  EXPECT_FALSE(types.has_fluids());
-  EXPECT_EQ(types.first_fluid(~0U), kAir);
 }
 
 TEST(ShapeAt, ShapesContainFluids) {
@@ -506,7 +488,7 @@ TEST(ShapeAt, ShapesContainFluids) {
   EXPECT_EQ(shape_at(grid, types, {0, 0, 0})->max.y, 0.5F);
 }
 
-TEST(VoxelShape, RejectsFluidsWithoutGroupsAndWithNeighbours) {
+TEST(VoxelShape, RejectsFluidsWithoutOneGroupAndWithNeighbours) {
   const auto error_of = [](ShapeRules rules) {
     const auto made = VoxelShapes::from_rules(std::move(rules));
     return made ? std::string() : made.error().message;
@@ -519,6 +501,7 @@ TEST(VoxelShape, RejectsFluidsWithoutGroupsAndWithNeighbours) {
   };
   EXPECT_EQ(error_of(with({.groups = 2})), "");
   EXPECT_EQ(error_of(with({})), start + "the fluid that voxels contain has no group");
+  EXPECT_EQ(error_of(with({.groups = 3})), start + "the fluid that voxels contain has more than one group");
   EXPECT_EQ(error_of(with({.groups = 2, .when = {{.connected = {Direction::PosX}}}})),
             start + "the fluid that voxels contain depends on neighbours");
   EXPECT_EQ(error_of(with({.groups = 2, .when = {{.corner = StairCorner::Straight}}})),
@@ -529,6 +512,8 @@ TEST(VoxelShape, RejectsFluidsWithoutGroupsAndWithNeighbours) {
   fluid.neighbours = ShapeNeighbours::Fluid;
   EXPECT_EQ(error_of(fluid), start + "a fluid contains a fluid");
   EXPECT_EQ(error_of({.neighbours = ShapeNeighbours::Fluid, .groups = 0}), start + "a fluid has no group");
+  EXPECT_EQ(error_of({.neighbours = ShapeNeighbours::Fluid, .groups = 6}), start + "a fluid has more than one group");
+  EXPECT_EQ(error_of({.neighbours = ShapeNeighbours::Fluid, .groups = 1U << 31}), "");
   VoxelProperties type = wet_slab(2);
   type.state_bits = 0;
   EXPECT_FALSE(validate_type(type)) << "its state does not have the bit";
@@ -813,6 +798,50 @@ TEST(ShapePositions, SharesOfSeveralCountsCombine) {
     EXPECT_EQ(shapes.model(0, {}, {.position = position}).boxes.size(), boxes) << position;
   }
   EXPECT_EQ(&shapes.model(0, {}, {.position = 4}), &shapes.model(0, {}, {.position = 8}));
+}
+
+// The most shares that a file can have, of which the last 12 put each position into its own class. Classifying costs
+// little more than to find the shares of each position.
+TEST(ShapePositions, MostSharesAreClassifiedFast) {
+  ShapeRules rules{.parts = {{.shape = slab()}, {.shape = slab()}}};
+  std::vector<PositionShare> shares;
+  constexpr std::size_t kSingles = kMaxPositionShares - 12;
+  for (std::size_t i = 0; i < kMaxPositionShares; ++i) {
+    const auto at = static_cast<std::uint16_t>(i);
+    const auto bit = static_cast<std::uint16_t>(i < kSingles ? 0U : 1U << (i - kSingles));
+    const auto twice = static_cast<std::uint16_t>(2 * bit);
+    shares.push_back(i < kSingles ? PositionShare{4'096, at, static_cast<std::uint16_t>(at + 1)}
+                                  : PositionShare{twice, bit, twice});
+    rules.parts[i < kSingles ? 0 : 1].when.push_back({.positions = shares.back()});
+  }
+  const auto seconds_of = [](auto&& work) {
+    const auto start = std::chrono::steady_clock::now();
+    work();
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
+  double least = std::numeric_limits<double>::infinity();
+  VoxelShapes shapes;
+  for (int i = 0; i < 3; ++i) {
+    std::size_t found = 0;
+    const double least_work = seconds_of([&] {
+      for (std::uint32_t position = 0; position < kMaxPositionCount; ++position) {
+        for (const PositionShare& share : shares) {
+          const std::uint32_t reduced = position % share.count;
+          found += static_cast<std::size_t>(reduced >= share.first && reduced < share.end);
+        }
+      }
+    });
+    EXPECT_EQ(found, kSingles + std::size_t{12} * 2'048);
+    const double ratio = seconds_of([&] { shapes = *VoxelShapes::from_rules(rules); }) / least_work;
+    RecordProperty("ratio", std::to_string(ratio));
+    least = std::min(least, ratio);
+  }
+  EXPECT_LT(least, 5.0);
+  ASSERT_EQ(shapes.position_count(), kMaxPositionCount);
+  for (std::uint16_t position = 0; position < kMaxPositionCount; ++position) {
+    const std::size_t boxes = (position < kSingles ? 1U : 0U) + (position != 0 ? 1U : 0U);
+    ASSERT_EQ(shapes.model(0, {}, {.position = position}).boxes.size(), boxes) << position;
+  }
 }
 
 TEST(ShapePositions, WrongSharesAreRefused) {

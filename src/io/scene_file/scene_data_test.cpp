@@ -497,7 +497,7 @@ VoxelProperties shaped_type() {
                    .neighbours = ShapeNeighbours::Connected,
                    .groups = 0xF000'0001U,
                    .connects_to_full_sides = false};
-  rules.fluid = ContainedFluid{.groups = 48, .when = {{.state_mask = 16, .state = 16}, {.state_mask = 12}}};
+  rules.fluid = ContainedFluid{.groups = 32, .when = {{.state_mask = 16, .state = 16}, {.state_mask = 12}}};
   type.shapes = *VoxelShapes::from_rules(std::move(rules));
   return type;
 }
@@ -578,9 +578,11 @@ TEST(SceneData, RefusesInvalidShapesWithTheirPosition) {
             shapes + ".neighbours: must be one of none, connected, stairs, fluid");
   EXPECT_EQ(error_with("\"groups\":4026531841", "\"groups\":-1"),
             shapes + ".groups: must be a whole number from 0 to 4294967295");
-  EXPECT_EQ(error_with("\"fluid\":{\"groups\":48", "\"fluid\":{\"groups\":0"),
+  EXPECT_EQ(error_with("\"fluid\":{\"groups\":32", "\"fluid\":{\"groups\":0"),
             shapes + ": cannot use the shapes of a type: the fluid that voxels contain has no group");
-  EXPECT_EQ(error_with("\"fluid\":{\"groups\":48,", "\"fluid\":{"), shapes + ".fluid: \"groups\" is missing");
+  EXPECT_EQ(error_with("\"fluid\":{\"groups\":32", "\"fluid\":{\"groups\":48"),
+            shapes + ": cannot use the shapes of a type: the fluid that voxels contain has more than one group");
+  EXPECT_EQ(error_with("\"fluid\":{\"groups\":32,", "\"fluid\":{"), shapes + ".fluid: \"groups\" is missing");
   EXPECT_EQ(error_with("\"state_mask\":12", "\"connected\":[\"+X\"]"),
             shapes + ": cannot use the shapes of a type: the fluid that voxels contain depends on neighbours");
   EXPECT_EQ(error_with("\"orientation\":29", "\"orientation\":48"),
