@@ -242,8 +242,10 @@ typedef struct quoin_shapes {
   /* Looks that sides refer to by number. Without texels (rgba null, texels 0), a look has the colour of its tint. */
   const quoin_face* looks;
   size_t look_count;
-  int32_t neighbours;         /* QUOIN_NEIGHBOURS_... */
-  uint32_t groups;            /* a bit per group: types with a common bit connect. Set it: usually 1 */
+  int32_t neighbours; /* QUOIN_NEIGHBOURS_... */
+  /* A bit per group: types with a common bit connect. Set it: usually 1. A fluid has exactly one bit. Fluids with the
+   * same bit are one body: give unrelated fluids, such as water and lava, different bits. */
+  uint32_t groups;
   int32_t ignores_full_sides; /* 1: does not connect to sides of other types that are covered wholly */
   int32_t reserved;           /* ignored */
 } quoin_shapes;

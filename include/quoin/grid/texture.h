@@ -105,6 +105,8 @@ class Texture {
   /// Returns true if both share their texels, so that they are equal.
   [[nodiscard]] bool shares_texels_with(const Texture& other) const { return content_ == other.content_; }
 
+  /// Returns true if the names and the texels are equal. Does not keep the texels of deferred textures; decodes them if
+  /// only the texels may differ.
   bool operator==(const Texture& other) const;
 
  private:

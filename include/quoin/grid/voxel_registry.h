@@ -197,14 +197,15 @@ const VoxelRegistry& decode_textures(const VoxelRegistry& types, Threads threads
 /// 0 <= flat < steep <= 90.
 [[nodiscard]] Status validate_type(const VoxelProperties& properties);
 
-/// A type that was added or replaced. Properties without a flag below can differ too.
+/// A type that was added or replaced, or can contain a fluid that was. Properties without a flag below can differ too.
 struct TypeChange {
   VoxelType type = kAir;
   bool visibility_changed =
       false;                    ///< `visibility`, also of shapes' material, or `occludes`; an unregistered type counts
                                 ///< as opaque, with defaults
   bool colour_changed = false;  ///< `colour`, `faces`, `field_textures`; also true if it was added
-  bool shape_changed = false;   ///< `shapes` or `orientations`; also true if the type was added with some
+  bool shape_changed = false;   ///< `shapes` or `orientations`, also if it was added with some; or a fluid that its
+                                ///< voxels can contain (ShapeRules::fluid) changed or became the first of its group
 };
 using TypeChanges = Changes<TypeChange>;
 
@@ -302,7 +303,7 @@ class VoxelRegistry {
   [[nodiscard]] std::uint32_t fluid_groups(VoxelType type) const {
     return has_fluids() && type < size() ? content_->fluid_groups[type] : 0;
   }
-  /// Returns true if both types are one type, or fluids with a common group: they hide their common faces.
+  /// Returns true if both types are one type, or fluids of the same group: they hide their common faces.
   [[nodiscard]] bool joins(VoxelType a, VoxelType b) const {
     return a == b || (fluid_groups(a) & fluid_groups(b)) != 0;
   }
@@ -320,8 +321,9 @@ class VoxelRegistry {
   /// Returns true if the state turns any registered type.
   [[nodiscard]] bool has_turned_by_state() const { return content_->turned_count > 0; }
 
-  /// Returns the types that were added or replaced since the cursor's last read, ordered by id, and moves the cursor to
-  /// the present. Cost: O(changed types). See ChangeCursor.
+  /// Returns the types that were added or replaced since the cursor's last read, and types that can contain such a
+  /// fluid (TypeChange::shape_changed), ordered by id, and moves the cursor to the present. Cost: O(changed types).
+  /// See ChangeCursor.
   [[nodiscard]] TypeChanges changes_since(ChangeCursor& cursor) const;
   /// Returns true if any type has changed since the cursor. Cost: O(1).
   [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor) const;
@@ -366,8 +368,8 @@ class VoxelRegistry {
 };
 
 /// Returns true if the neighbour of a voxel in a direction covers a face (ModelFace::mask) on the voxel's side there.
-/// `neighbour_model`: null for a cube. `type`: of the voxel with the face: voxels of one transparent type hide each
-/// other's common faces.
+/// `neighbour_model`: null for a cube. `type`: of the voxel with the face: voxels of one transparent type, and
+/// fluids of the same group (VoxelRegistry::joins), hide each other's common faces.
 [[nodiscard]] bool covers(const VoxelRegistry& types, VoxelType neighbour, const ShapeModel* neighbour_model,
                           VoxelType type, Direction direction, const SideMask& mask);
 

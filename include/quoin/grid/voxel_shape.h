@@ -209,9 +209,10 @@ enum class ShapeNeighbours : std::uint8_t {
   /// turned by a quarter, they form a corner (StairCorner).
   Stairs,
   /// Fluids: the surface is inclined towards lower neighbours. The three lowest bits of the state are the level: 0 is a
-  /// source, 1 to 7 are lower; bit 3 means that the fluid falls and fills its voxel. `parts` are not used. Fluids of
-  /// different types with a common group (ShapeRules::groups) are one: their heights join, and they hide their common
-  /// faces.
+  /// source, 1 to 7 are lower; bit 3 means that the fluid falls and fills its voxel. `parts` are not used. A
+  /// fluid has exactly one group (ShapeRules::groups, 1 by default). Fluids of different types and the same group are
+  /// one: their heights join, they hide their common faces, and rays see one body. Give unrelated fluids, such as water
+  /// and lava, different groups.
   Fluid,
 };
 
@@ -219,7 +220,7 @@ enum class ShapeNeighbours : std::uint8_t {
 /// fluid of its groups has there. Rays and meshes show it with the type of a fluid next to the voxel, else of the first
 /// registered one (VoxelRegistry::first_fluid). Bodies and queries do not meet it.
 struct ContainedFluid {
-  std::uint32_t groups = 0;  ///< as ShapeRules::groups of the fluid
+  std::uint32_t groups = 0;  ///< as ShapeRules::groups of the fluid: exactly one bit
   /// Present if any of them holds; empty: always. They depend on the state only.
   std::vector<ShapeCondition> when{};
 
@@ -356,8 +357,8 @@ class VoxelShapes {
   /// Errors: InvalidArgument if there are no or more than kMaxShapeParts parts (except for fluids), a part has no
   ///         shape, all parts together have more than 4 * kMaxShapeElements elements, a share of positions is empty or
   ///         not within its count, there are more than kMaxPositionShares of them, their counts have no common multiple
-  ///         up to kMaxPositionCount, or `fluid` has no group, is in a fluid, or has a condition of neighbours or
-  ///         positions.
+  ///         up to kMaxPositionCount, a fluid or `fluid` does not have exactly one group, or `fluid` is in a fluid, or
+  ///         has a condition of neighbours or positions.
   [[nodiscard]] static Result<VoxelShapes> from_rules(ShapeRules rules);
 
   [[nodiscard]] bool empty() const { return content_ == nullptr; }

@@ -800,8 +800,8 @@ TEST(ShapePositions, SharesOfSeveralCountsCombine) {
   EXPECT_EQ(&shapes.model(0, {}, {.position = 4}), &shapes.model(0, {}, {.position = 8}));
 }
 
-// The most shares that a file can have, of which the last 12 put each position into its own class. Classifying costs
-// little more than to find the shares of each position.
+// The most shares that a file can have. The last 12 put each position into its own class. Classifying costs little more
+// than to find the shares of each position.
 TEST(ShapePositions, MostSharesAreClassifiedFast) {
   ShapeRules rules{.parts = {{.shape = slab()}, {.shape = slab()}}};
   std::vector<PositionShare> shares;
