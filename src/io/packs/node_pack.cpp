@@ -128,40 +128,36 @@ Result<FileBytes> draw_tile(std::string_view name, std::size_t max_bytes) {
 /// The PNG files of a folder, by name.
 class NodeFolder final : public PackFiles {
  public:
-  NodeFolder(const fs::path& folder, std::map<std::string, fs::path, std::less<>> files)
-      : folder_(folder.string()), files_(std::move(files)) {}
+  /// Requires: an absolute folder without links.
+  NodeFolder(fs::path folder, std::map<std::string, fs::path, std::less<>> files)
+      : folder_(std::move(folder)), files_(std::move(files)) {}
 
   [[nodiscard]] bool has_tiles() const override { return true; }
-  [[nodiscard]] std::string identity() const override { return "folder " + folder_; }
+  [[nodiscard]] std::string identity() const override { return "folder " + folder_.string(); }
 
   [[nodiscard]] Result<FileBytes> read(std::string_view path, std::size_t max_bytes) const override {
     constexpr std::string_view kAnimationEnd = ".mcmeta";
     const bool is_animation = path.ends_with(kAnimationEnd);
     if (is_animation) path.remove_suffix(kAnimationEnd.size());
-    const fs::path* const file = find(tile_of(path));
-    if (file == nullptr) return FileBytes();
-    if (is_animation) return animation_of(*file);
-    auto bytes = read_file_beginning(*file, max_bytes + 1);
+    const auto found = files_.find(tile_of(path));
+    if (found == files_.end()) return FileBytes();
+    const fs::path& file = found->second;
+    if (const auto inside = check_inside(folder_, file); !inside) return inside.error();
+    if (is_animation) return animation_of(file);
+    auto bytes = read_file_beginning(file, max_bytes + 1);
     if (!bytes) return bytes.error();
     if (bytes->size() > max_bytes) {
       return make_error(ErrorCode::LimitExceeded, "a file of more than " + std::to_string(max_bytes) + " bytes",
-                        file->string());
+                        file.string());
     }
     return FileBytes(std::move(*bytes));
   }
 
- private:
-  [[nodiscard]] const fs::path* find(std::string_view tile) const {
-    if (tile.empty()) return nullptr;
-    if (const auto found = files_.find(tile); found != files_.end()) return &found->second;
-    for (const std::string_view end : {"_top", "_bottom", "_side", "_front"}) {
-      if (tile.size() <= end.size() || !tile.ends_with(end)) continue;
-      const auto found = files_.find(tile.substr(0, tile.size() - end.size()));
-      return found == files_.end() ? nullptr : &found->second;
-    }
-    return nullptr;
+  [[nodiscard]] bool has(std::string_view path) const override {
+    return path.ends_with(kTileEnd) ? files_.contains(tile_of(path)) : PackFiles::has(path);
   }
 
+ private:
   /// Returns the text of an animation if the image is higher than wide, a whole number of times.
   [[nodiscard]] static Result<FileBytes> animation_of(const fs::path& file) {
     constexpr std::size_t kHeader = 24;
@@ -176,7 +172,7 @@ class NodeFolder final : public PackFiles {
     return FileBytes(std::vector<std::byte>(text.begin(), text.end()));
   }
 
-  std::string folder_;
+  fs::path folder_;
   std::map<std::string, fs::path, std::less<>> files_;
 };
 
@@ -185,6 +181,14 @@ class NodeFolder final : public PackFiles {
 std::string tile_path(std::string_view name) {
   if (name.ends_with(kTileEnd)) name.remove_suffix(kTileEnd.size());
   return std::string(kTileFolder).append(name).append(kTileEnd);
+}
+
+std::string tile_without_end(std::string_view path) {
+  const std::string_view tile = tile_of(path);
+  for (const std::string_view end : {"_top", "_bottom", "_side", "_front"}) {
+    if (tile.size() > end.size() && tile.ends_with(end)) return tile_path(tile.substr(0, tile.size() - end.size()));
+  }
+  return {};
 }
 
 StateOrientations node_orientations(std::string_view turn) {
@@ -261,7 +265,7 @@ bool is_node_folder(const fs::path& folder) {
          fs::is_directory(folder / "mods", error) || fs::is_directory(folder / "textures", error);
 }
 
-Result<std::shared_ptr<const PackFiles>> open_node_folder(const fs::path& folder) {
+Result<std::map<std::string, fs::path, std::less<>>> tiles_of_folder(const fs::path& folder) {
   constexpr int kMaxDepth = 8;
   constexpr std::size_t kMaxFiles = 100'000;
   std::error_code error;
@@ -290,7 +294,16 @@ Result<std::shared_ptr<const PackFiles>> open_node_folder(const fs::path& folder
     std::string name = path.stem().string();
     files.insert_or_assign(std::move(name), std::move(path));
   }
-  return std::shared_ptr<const PackFiles>(std::make_shared<NodeFolder>(folder, std::move(files)));
+  return files;
+}
+
+Result<std::shared_ptr<const PackFiles>> open_node_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::path real = fs::canonical(folder, error);
+  if (error) return make_error(ErrorCode::CannotRead, "cannot find the folder: " + error.message(), folder.string());
+  auto files = tiles_of_folder(real);
+  if (!files) return files.error();
+  return std::shared_ptr<const PackFiles>(std::make_shared<NodeFolder>(std::move(real), std::move(*files)));
 }
 
 }  // namespace quoin::packs

@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -25,6 +27,10 @@ namespace quoin::packs {
 
 /// Returns the path of a tile ("default_stone.png") as a file of a pack: assets/luanti/textures/block/NAME.png.
 [[nodiscard]] std::string tile_path(std::string_view name);
+
+/// Returns the tile that stands for a missing one with the end "_top", "_bottom", "_side" or "_front": the path without
+/// it. Empty for other paths.
+[[nodiscard]] std::string tile_without_end(std::string_view path);
 
 /// Returns the orientations that `param2` selects: "facedir" (24 of 32 values), "4dir", or "wallmounted" (the
 /// direction of the wall); empty for other texts. They turn nodes in the axes of grids, where z is mirrored.
@@ -57,10 +63,16 @@ class NodePack final : public PackFiles {
 /// modpack.txt, texture_pack.conf, init.lua, or a folder `mods` or `textures`.
 [[nodiscard]] bool is_node_folder(const std::filesystem::path& folder);
 
-/// Opens the PNG files in all folders `textures` of such a folder, or in the whole folder of a texture pack, by their
-/// names, as tiles (tile_path). Of equal names, the path that sorts last wins. A tile that is missing with the end
-/// "_top", "_bottom", "_side" or "_front" is the one without it. Tiles of frames below each other have an animation.
+/// Returns the PNG files in all folders `textures` of such a folder, or in the whole folder of a texture pack, by their
+/// names without ".png". Of equal names, the path that sorts last wins. Folders that are links are not searched, and
+/// files may be links out of the folder (check_inside).
 /// Errors: CannotRead; LimitExceeded beyond 100,000 files. Depth: folders below 8 levels are not searched.
+[[nodiscard]] Result<std::map<std::string, std::filesystem::path, std::less<>>> tiles_of_folder(
+    const std::filesystem::path& folder);
+
+/// Opens the files of tiles_of_folder as tiles (tile_path). Links out of the folder are errors when they are read.
+/// Tiles of frames below each other have an animation.
+/// Errors: those of tiles_of_folder.
 [[nodiscard]] Result<std::shared_ptr<const PackFiles>> open_node_folder(const std::filesystem::path& folder);
 
 }  // namespace quoin::packs

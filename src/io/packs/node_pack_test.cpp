@@ -16,6 +16,7 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/io/block_packs.h>
 
+#include "core/bytes/text.h"
 #include "io/luanti/luanti.h"
 #include "io/packs/pack_looks.h"
 #include "io/packs/pack_own.h"
@@ -168,7 +169,6 @@ TEST(NodePack, JoinsFencesWallsAndPanes) {
   EXPECT_TRUE(fills_node(joined, {8, 12, 0}));
   // Rails choose among straight, curved, and two kinds of crossings.
   const VoxelProperties rail = shown_node("carts:rail");
-  std::set<const Texture*> textures;
   around.connected.insert(Direction::PosX);
   EXPECT_EQ(node_model(rail, 0, around).boxes.size(), 1U);
   for (unsigned bits = 0; bits < 16; ++bits) {
@@ -320,6 +320,47 @@ TEST(NodeFolder, ReplacesLooksOfEarlierConversions) {
   EXPECT_EQ(node_face_colour(with_folder.applied(drawn), Direction::PosX), (Rgba8{250, 10, 10}));
   BlockLooks without(std::make_shared<MemoryPack>(), OwnPack::instance());
   EXPECT_EQ(without.applied(drawn), drawn);
+}
+
+TEST(NodeFolder, PrefersExactTilesOfLowerFolders) {
+  const auto put = [](const fs::path& folder, const std::string& name, const std::string& png) {
+    fs::create_directories(folder);
+    std::ofstream(folder / (name + ".png"), std::ios::binary) << png;
+  };
+  const GameFolder folder;
+  const Rgba8 red{250, 10, 10};
+  const Rgba8 green{10, 200, 10};
+  const std::string strip = packs_test::png(
+      16,
+      [](int, int y) {
+        return y < 16 ? Rgba8{1, 2, 3} : Rgba8{0, 0, 255};
+      },
+      4);
+  put(folder.path / "game/textures", "default_tree_side", plain_png(green));
+  put(folder.path / "top/textures", "default_tree", strip);
+  const auto files = PackStack::open(std::vector{folder.path / "game", folder.path / "top"}, {});
+  ASSERT_TRUE(files);
+  const auto is_same = [&](const std::string& tile, const std::string& png) {
+    const auto bytes = (*files)->read(tile_path(tile), kMaxImageBytes);
+    return bytes && *bytes && text_of(**bytes) == png;
+  };
+  const auto is_animated = [&](const std::string& tile) {
+    const auto bytes = (*files)->read(tile_path(tile) + ".mcmeta", kMaxJsonBytes);
+    return bytes && *bytes;
+  };
+  EXPECT_TRUE(is_same("default_tree_side", plain_png(green))) << "a lower folder has it";
+  EXPECT_TRUE(is_same("default_tree_top", strip)) << "no folder has it";
+  EXPECT_TRUE((*files)->has(tile_path("default_tree_front")));
+  EXPECT_FALSE((*files)->has(tile_path("default_tree_back")));
+  EXPECT_FALSE((*files)->has(tile_path("_top")));
+  EXPECT_TRUE(is_animated("default_tree"));
+  EXPECT_TRUE(is_animated("default_tree_top"));
+  EXPECT_FALSE(is_animated("default_tree_side")) << "the animation belongs to another image";
+  put(folder.path / "top/textures", "default_tree_side", plain_png(red));
+  const auto again = PackStack::open(std::vector{folder.path / "game", folder.path / "top"}, {});
+  ASSERT_TRUE(again);
+  const auto bytes = (*again)->read(tile_path("default_tree_side"), kMaxImageBytes);
+  EXPECT_TRUE(bytes && *bytes && text_of(**bytes) == plain_png(red));
 }
 
 TEST(NodeFolder, BlendsTilesAndShowsFirstFrames) {

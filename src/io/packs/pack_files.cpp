@@ -28,7 +28,7 @@ constexpr std::uint64_t kMaxZipBytes = std::uint64_t{2} << 30;
 constexpr std::size_t kMaxEntries = std::size_t{1} << 20;
 constexpr std::uint64_t kMaxFolderBytes = kMaxZipBytes;
 
-/// The sizes and CRC-32 of a pack's files below `assets`.
+/// The sizes and CRC-32 of a pack's files.
 using FileSums = std::map<std::string, ZipParts::Sum>;
 
 std::uint64_t with_text(std::uint64_t hash, std::string_view text) {
@@ -69,15 +69,17 @@ class FolderPack final : public PackFiles {
     const fs::path file = folder_ / fs::path(path);
     std::error_code error;
     if (!fs::is_regular_file(file, error)) return FileBytes();
-    const fs::path real = fs::canonical(file, error);
-    if (error || std::ranges::mismatch(folder_, real).in1 != folder_.end()) {
-      return make_error(ErrorCode::CannotRead, "a link to a file outside the folder of the pack", std::string(path));
-    }
+    if (const auto inside = check_inside(folder_, file); !inside) return inside.error();
     // One byte more shows a file that is too large, also if it grows.
     auto bytes = read_file_beginning(file, max_bytes + 1);
     if (!bytes) return bytes.error();
     if (bytes->size() > max_bytes) return too_large(path, fs::file_size(file, error), max_bytes);
     return FileBytes(std::move(*bytes));
+  }
+
+  [[nodiscard]] bool has(std::string_view path) const override {
+    std::error_code error;
+    return is_pack_path(path) && fs::is_regular_file(folder_ / fs::path(path), error);
   }
 
   [[nodiscard]] std::string identity() const override { return "folder " + folder_.string(); }
@@ -124,6 +126,10 @@ class ZipPack final : public PackFiles {
     return FileBytes(std::move(*bytes));
   }
 
+  [[nodiscard]] bool has(std::string_view path) const override {
+    return is_pack_path(path) && parts_.has(prefix_ + std::string(path));
+  }
+
   [[nodiscard]] std::string identity() const override {
     return "zip " + std::to_string(bytes_.size()) + " " + std::to_string(hash_of(sums()));
   }
@@ -163,40 +169,95 @@ Error no_assets(const fs::path& folder) {
                     folder.string());
 }
 
-// Returns the sums of the files below `assets`, or of the images of a Luanti game, mod or texture pack.
-Result<FileSums> sums_of_folder(const fs::path& folder) {
-  FileSums sums;
-  std::error_code missing;
-  const bool has_assets = fs::is_directory(folder / "assets", missing);
-  if (!has_assets && !is_node_folder(folder)) return no_assets(folder);
-  std::size_t entries = 0;
-  std::uint64_t bytes = 0;
-  std::error_code error;
-  for (fs::recursive_directory_iterator at(has_assets ? folder / "assets" : folder, error), end; !error && at != end;
-       at.increment(error)) {
-    if (++entries > kMaxEntries) {
-      return make_error(ErrorCode::LimitExceeded,
-                        "the folder has more than " + std::to_string(kMaxEntries) + " files and folders",
-                        folder.string());
+/// Adds up the files of a folder that FolderPack or NodeFolder read. Requires: an absolute path without links.
+class FolderSums {
+ public:
+  explicit FolderSums(const fs::path& folder) : folder_(folder) {}
+
+  /// Adds the files of a folder and those below, also through links that stay inside.
+  Status add_folder(const fs::path& at) {
+    std::error_code error;
+    const fs::path real = fs::canonical(at, error);
+    if (error || !check_inside(folder_, at)) return {};
+    if (std::ranges::find(entered_, real) != entered_.end()) {
+      return make_error(ErrorCode::CannotRead, "a link to a folder that contains it", at.string());
     }
-    const std::string path = at->path().lexically_relative(folder).generic_string();
-    std::error_code unknown;
-    if (!is_pack_path(path)) {
-      at.disable_recursion_pending();
-    } else if ((has_assets || path.ends_with(".png")) && at->is_regular_file(unknown) &&
-               at->file_size(unknown) <= kMaxImageBytes) {
-      const auto content = read_file(at->path());
-      if (!content) return content.error();
-      bytes += content->size();
-      if (bytes > kMaxFolderBytes) return too_large(folder.string(), bytes, kMaxFolderBytes);
-      sums.emplace(path, ZipParts::Sum{content->size(), crc32_of(*content)});
+    entered_.push_back(real);
+    fs::directory_iterator entry(at, error);
+    for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
+      if (++entries_ > kMaxEntries) {
+        return make_error(ErrorCode::LimitExceeded,
+                          "the folder has more than " + std::to_string(kMaxEntries) + " files and folders",
+                          folder_.string());
+      }
+      const std::string path = entry->path().lexically_relative(folder_).generic_string();
+      if (!is_pack_path(path)) continue;
+      std::error_code unknown;
+      const auto done = entry->is_directory(unknown) ? add_folder(entry->path()) : add_file(path, entry->path());
+      if (!done) return done.error();
     }
+    if (error) return make_error(ErrorCode::CannotRead, error.message(), at.string());
+    entered_.pop_back();
+    return {};
   }
-  if (error) return make_error(ErrorCode::CannotRead, error.message(), folder.string());
-  return sums;
+
+  /// Adds a file by a name. Files that are never read do not count: too large, or behind links out of the folder.
+  Status add_file(const std::string& name, const fs::path& file) {
+    std::error_code unknown;
+    if (!fs::is_regular_file(file, unknown) || !check_inside(folder_, file)) return {};
+    const std::uint64_t size = fs::file_size(file, unknown);
+    if (unknown || size > kMaxImageBytes) return {};
+    const auto content = read_file(file);
+    if (!content) return content.error();
+    bytes_ += content->size();
+    if (bytes_ > kMaxFolderBytes) return too_large(folder_.string(), bytes_, kMaxFolderBytes);
+    sums_.emplace(name, ZipParts::Sum{content->size(), crc32_of(*content)});
+    return {};
+  }
+
+  [[nodiscard]] FileSums take() { return std::move(sums_); }
+
+ private:
+  const fs::path& folder_;
+  std::vector<fs::path> entered_;
+  FileSums sums_;
+  std::size_t entries_ = 0;
+  std::uint64_t bytes_ = 0;
+};
+
+/// Returns the sums of the files below `assets`, or of the tiles of a Luanti game, mod or texture pack.
+Result<FileSums> sums_of_folder(const fs::path& path) {
+  std::error_code error;
+  const fs::path folder = fs::canonical(path, error);
+  if (error) return make_error(ErrorCode::CannotRead, "cannot find the folder: " + error.message(), path.string());
+  FolderSums sums(folder);
+  if (fs::is_directory(folder / "assets", error)) {
+    if (auto done = sums.add_folder(folder / "assets"); !done) return done.error();
+    return sums.take();
+  }
+  if (!is_node_folder(folder)) return no_assets(path);
+  const auto tiles = tiles_of_folder(folder);
+  if (!tiles) return tiles.error();
+  for (const auto& [name, file] : *tiles) {
+    if (auto done = sums.add_file(tile_path(name), file); !done) return done.error();
+  }
+  return sums.take();
 }
 
 }  // namespace
+
+Status check_inside(const fs::path& folder, const fs::path& file) {
+  std::error_code error;
+  const fs::path real = fs::canonical(file, error);
+  if (!error && std::ranges::mismatch(folder, real).in1 == folder.end()) return {};
+  return make_error(ErrorCode::CannotRead, "a link to a file outside the folder of the pack",
+                    file.lexically_relative(folder).generic_string());
+}
+
+bool PackFiles::has(std::string_view path) const {
+  const auto bytes = read(path, kMaxImageBytes);
+  return !bytes || *bytes;
+}
 
 bool is_pack_path(std::string_view path) {
   constexpr std::size_t kMaxPath = 512;
@@ -317,6 +378,36 @@ bool PackStack::has_tiles() const {
 }
 
 Result<FileBytes> PackStack::read(std::string_view path, std::size_t max_bytes) const {
+  auto bytes = read_exact(path, max_bytes);
+  if (!bytes || *bytes) return bytes;
+  const std::string other = substitute_of(path);
+  return other.empty() ? FileBytes() : read_exact(other, max_bytes);
+}
+
+bool PackStack::has(std::string_view path) const {
+  if (has_exact(path)) return true;
+  const std::string other = substitute_of(path);
+  return !other.empty() && has_exact(other);
+}
+
+std::string PackStack::substitute_of(std::string_view path) const {
+  if (!has_tiles()) return {};
+  // A tile that exists has no other tile's animation.
+  constexpr std::string_view kAnimationEnd = ".mcmeta";
+  const bool is_animation = path.ends_with(kAnimationEnd);
+  const std::string_view image = path.substr(0, path.size() - (is_animation ? kAnimationEnd.size() : 0));
+  std::string other = tile_without_end(image);
+  if (other.empty() || !is_animation) return other;
+  return has_exact(image) ? std::string() : other.append(kAnimationEnd);
+}
+
+bool PackStack::has_exact(std::string_view path) const {
+  const std::string other_name = name_in_other_versions(path);
+  return std::ranges::any_of(
+      packs_, [&](const auto& pack) { return pack->has(path) || (!other_name.empty() && pack->has(other_name)); });
+}
+
+Result<FileBytes> PackStack::read_exact(std::string_view path, std::size_t max_bytes) const {
   const std::string other_name = name_in_other_versions(path);
   for (const auto& pack : std::views::reverse(packs_)) {
     auto bytes = pack->read(path, max_bytes);

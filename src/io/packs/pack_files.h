@@ -56,6 +56,8 @@ class PackFiles {
   /// Errors: CannotRead, BadFormat, Unsupported; LimitExceeded if the file is larger than `max_bytes`.
   [[nodiscard]] virtual Result<std::optional<std::vector<std::byte>>> read(std::string_view path,
                                                                            std::size_t max_bytes) const = 0;
+  /// Returns true if the pack has a file, also if it cannot be read. The default reads it.
+  [[nodiscard]] virtual bool has(std::string_view path) const;
   /// Returns true if the files are tiles of Luanti nodes (node_pack.h), or some of them.
   [[nodiscard]] virtual bool has_tiles() const { return false; }
   /// Returns a text that differs between packs of different content, as far as it is known without reading all files.
@@ -73,8 +75,11 @@ class PackFiles {
 /// Opens the bytes of a zip file as a pack. Errors: as open_pack.
 [[nodiscard]] Result<std::shared_ptr<const PackFiles>> open_pack(std::vector<std::byte> zip);
 
-/// Returns a hash over the names, sizes and CRC-32 of a pack's files (hash_of_pack). Errors: as open_pack, and
-/// LimitExceeded for folders with too many files.
+/// Returns an error unless a file is inside a folder, without following links out of it. Requires: `folder` is absolute
+/// and has no links. Errors: CannotRead, naming the file.
+[[nodiscard]] Status check_inside(const std::filesystem::path& folder, const std::filesystem::path& file);
+
+/// Returns a hash over the names, sizes and CRC-32 of a pack's files (hash_of_pack). Errors: as hash_of_pack.
 [[nodiscard]] Result<std::uint64_t> hash_of_files(const std::filesystem::path& path);
 
 /// Files in memory, by path.
@@ -87,6 +92,7 @@ class MemoryPack final : public PackFiles {
   void put(std::string_view path, std::string content);
   [[nodiscard]] Result<std::optional<std::vector<std::byte>>> read(std::string_view path,
                                                                    std::size_t max_bytes) const override;
+  [[nodiscard]] bool has(std::string_view path) const override { return files_.contains(path) && is_pack_path(path); }
   [[nodiscard]] std::string identity() const override;
 
  private:
@@ -94,7 +100,8 @@ class MemoryPack final : public PackFiles {
 };
 
 /// A list of packs: later ones override earlier ones, file by file. Textures of blocks are found in the folders
-/// textures/block and textures/blocks, by either name, since 1.13 renamed it.
+/// textures/block and textures/blocks, by either name, since 1.13 renamed it. A tile of Luanti that no pack has is the
+/// one without its end (tile_without_end).
 class PackStack final : public PackFiles {
  public:
   PackStack() = default;
@@ -105,10 +112,18 @@ class PackStack final : public PackFiles {
                                                                      std::vector<std::vector<std::byte>> zips);
   [[nodiscard]] Result<std::optional<std::vector<std::byte>>> read(std::string_view path,
                                                                    std::size_t max_bytes) const override;
+  [[nodiscard]] bool has(std::string_view path) const override;
   [[nodiscard]] bool has_tiles() const override;
   [[nodiscard]] std::string identity() const override;
 
  private:
+  /// Reads a file of exactly this name.
+  [[nodiscard]] Result<std::optional<std::vector<std::byte>>> read_exact(std::string_view path,
+                                                                         std::size_t max_bytes) const;
+  [[nodiscard]] bool has_exact(std::string_view path) const;
+  /// Returns the tile that stands for one that no pack has; empty for other files.
+  [[nodiscard]] std::string substitute_of(std::string_view path) const;
+
   std::vector<std::shared_ptr<const PackFiles>> packs_;
 };
 

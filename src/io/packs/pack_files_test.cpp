@@ -5,15 +5,20 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <new>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include <quoin/core/hash.h>
 #include <quoin/io/block_packs.h>
 #include <quoin/io/file.h>
 
 #include "core/bytes/bytes.h"
+#include "io/packs/node_pack.h"
 #include "io/packs/packs_for_tests.h"
 #include "io/zip.h"
 
@@ -134,6 +139,68 @@ TEST(PackFiles, RefusesLinksOutOfTheFolder) {
     }
     EXPECT_EQ(text_in(**pack, "assets/alias/a.json"), "inside") << "a link within the folder";
   }
+}
+
+TEST(PackFiles, RefusesLinksOutOfLuantiFolders) {
+  const fs::path folder = fresh_folder("node_links");
+  write_text(folder / "secret.png", packs_test::plain_png({1, 2, 3}));
+  write_text(folder / "game/game.conf", "");
+  write_text(folder / "game/textures/real.png", "inside");
+  std::error_code error;
+  fs::create_symlink(folder / "secret.png", folder / "game/textures/private.png", error);
+  if (error) GTEST_SKIP() << "the file system has no links";
+  fs::create_symlink("real.png", folder / "game/textures/alias.png");
+  fs::create_directory_symlink(folder / "game", folder / "link");
+  for (const char* name : {"game", "link"}) {
+    const auto pack = open_pack(folder / name);
+    ASSERT_TRUE(pack);
+    for (const char* end : {"", ".mcmeta"}) {
+      const std::string text = text_in(**pack, tile_path("private") + end);
+      EXPECT_NE(text.find("a link to a file outside the folder"), std::string::npos) << text;
+    }
+    EXPECT_EQ(text_in(**pack, tile_path("real")), "inside");
+    EXPECT_EQ(text_in(**pack, tile_path("alias")), "inside") << "a link within the folder";
+  }
+}
+
+TEST(PackFiles, HashCountsTheFilesThatAreUsed) {
+  const fs::path folder = fresh_folder("hash");
+  const auto hash_of = [&](const char* name) {
+    const auto hash = hash_of_files(folder / name);
+    EXPECT_TRUE(hash) << name;
+    return hash ? *hash : 0;
+  };
+  // Returns true if a change of a file changes the hash of a pack.
+  const auto counts = [&](const char* name, const fs::path& file) {
+    write_text(folder / file, "before");
+    const std::uint64_t before = hash_of(name);
+    write_text(folder / file, "after");
+    const std::uint64_t after = hash_of(name);
+    fs::remove(folder / file);
+    return after != before;
+  };
+  write_text(folder / "pack/assets/a.json", "{}");
+  write_text(folder / "game/game.conf", "");
+  write_text(folder / "game/mods/textures/stone.png", "tile");
+  EXPECT_TRUE(counts("game", "game/mods/my mod/textures/x.png")) << "names with blanks are tiles";
+  EXPECT_FALSE(counts("game", "game/mods/textures/x.txt"));
+  EXPECT_FALSE(counts("game", "game/mods/pictures/x.png")) << "no tile";
+  fs::create_directories(folder / "outside");
+  fs::create_directories(folder / "pack/real");
+  std::error_code error;
+  fs::create_directory_symlink(folder / "pack/real", folder / "pack/assets/alias", error);
+  if (error) GTEST_SKIP() << "the file system has no links";
+  EXPECT_TRUE(counts("pack", "pack/real/b.json")) << "a linked folder inside";
+  fs::create_directory_symlink(folder / "outside", folder / "pack/assets/far");
+  EXPECT_FALSE(counts("pack", "outside/b.json")) << "a linked folder outside";
+  fs::create_symlink(folder / "outside/c", folder / "pack/assets/c.json");
+  EXPECT_FALSE(counts("pack", "outside/c")) << "a linked file outside";
+  fs::create_symlink(folder / "outside/c.png", folder / "game/mods/textures/c.png");
+  EXPECT_FALSE(counts("game", "outside/c.png")) << "a linked tile outside";
+  fs::create_directory_symlink(folder / "pack/assets", folder / "pack/real/again");
+  const auto circular = hash_of_files(folder / "pack");
+  ASSERT_FALSE(circular);
+  EXPECT_EQ(circular.error().code, ErrorCode::CannotRead);
 }
 
 TEST(PackFiles, IdentitiesDifferByContent) {

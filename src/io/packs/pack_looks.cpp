@@ -710,10 +710,7 @@ std::vector<BlockLooks::Source> BlockLooks::sources_of_node(const VoxelPropertie
   const BlockFamilies::Traits traits = NodePack::families().traits(name);
   const TypeStates states(type.name, param2_fields(), traits.groups != 0);
   const std::string tile = name.space + "_" + name.path;
-  const auto has_tile = [&](const char* end) {
-    const auto found = packs_->read(tile_path(tile + end), kMaxImageBytes);
-    return found && *found;
-  };
+  const auto has_tile = [&](const char* end) { return packs_->has(tile_path(tile + end)); };
   sources.push_back({&library_, states, traits, true});
   // A node that only the rule for all names knows, and whose texture no folder has, may have the name of a block.
   const bool is_block = traits.is_fallback && own_library_ && !name.path.empty() &&
