@@ -361,7 +361,7 @@ class BlockLooks::Maker {
       std::vector<ShapeCondition> narrower;
       for (ShapeCondition condition : when) {
         const std::uint32_t bits = value << field.first_bit;
-        if ((condition.state_mask & mask) == mask && (condition.state & mask) != bits) continue;
+        if (((condition.state ^ bits) & condition.state_mask & mask) != 0) continue;
         condition.state_mask |= mask;
         condition.state |= bits;
         narrower.push_back(condition);

@@ -359,6 +359,25 @@ TEST(PackLooks, WiresAreColouredByPower) {
   EXPECT_EQ(tint("15"), (Rgba8{255, 50, 0}));
 }
 
+TEST(PackLooks, TintsOfStatesKeepTheirVariants) {
+  PackBuilder pack = small_pack();
+  for (const std::string texture : {"red", "green"}) {
+    pack.model("block/" + texture, R"({"elements": [{"from": [0, 4, 0], "to": [16, 4, 16],
+        "faces": {"up": {"texture": "block/)" +
+                                       texture + R"(", "tintindex": 0}}}]})");
+  }
+  pack.states("melon_stem", R"({"variants": {"age=7": {"model": "block/red"}, "": {"model": "block/green"}}})");
+  for (int age = 0; age < 8; ++age) {
+    const TypeAndState stem = block("minecraft:melon_stem", {{"age", std::to_string(age)}});
+    const VoxelProperties made = look(pack, stem.type);
+    const ShapeModel& model = shape_of(made, stem.state);
+    ASSERT_EQ(model.faces.size(), 1U) << age;
+    const VoxelFace* const face = look_of(model, model.faces[0], made.faces);
+    EXPECT_EQ(face->texture.name(), age == 7 ? "minecraft:block/red" : "minecraft:block/green") << age;
+    EXPECT_EQ(face->tint.r, age * 32) << age;
+  }
+}
+
 TEST(PackLooks, TexturesOfOldPacksAreFound) {
   auto below = std::make_shared<MemoryPack>();
   auto above = std::make_shared<MemoryPack>();

@@ -169,7 +169,7 @@ Status TypeStates::restrict(std::vector<ShapeCondition>& all, const StateTerm& t
     for (const std::uint32_t code : codes) {
       const std::uint32_t mask = mask_of(*found);
       const std::uint32_t bits = code << found->first_bit;
-      if ((condition.state_mask & mask) == mask && (condition.state & mask) != bits) continue;
+      if (((condition.state ^ bits) & condition.state_mask & mask) != 0) continue;
       ShapeCondition narrower = condition;
       narrower.state_mask |= mask;
       narrower.state |= bits;
