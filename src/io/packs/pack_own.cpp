@@ -245,7 +245,12 @@ Status add_files(const OwnPack& pack, ModelReader& models, const ResourceName& b
   };
   const std::string path = "assets/" + block.space + "/blockstates/" + block.path + ".json";
   if (auto done = add(path); !done) return done;
-  const auto states = parse_block_states(nlohmann::json::parse(text_of(files[path])));
+  const auto found = files.find(path);
+  if (found == files.end()) {
+    return make_error(ErrorCode::InvalidArgument,
+                      "the name of a block is too long: " + std::to_string(to_string(block).size()) + " letters");
+  }
+  const auto states = parse_block_states(nlohmann::json::parse(text_of(found->second)));
   if (!states) return states.error();
   for (const StateCase& each : states->cases) {
     for (const StateModel& shown : each.models) {

@@ -216,6 +216,18 @@ TEST(OwnPack, WritesNoPackForInvalidNames) {
   }
 }
 
+TEST(OwnPack, WritesNoPackForNamesWithoutAPath) {
+  const std::string overhead = "assets/minecraft/blockstates/.json";
+  EXPECT_TRUE(write_builtin_pack(std::vector{std::string(400, 'a')}));
+  for (const std::size_t size : {513 - overhead.size(), std::size_t{512}}) {
+    ASSERT_TRUE(resource_name(std::string(size, 'a')));
+    const auto zip = write_builtin_pack(std::vector{std::string(size, 'a')});
+    ASSERT_FALSE(zip) << size;
+    EXPECT_EQ(zip.error().code, ErrorCode::InvalidArgument);
+    EXPECT_NE(zip.error().message.find("the name of a block is too long"), std::string::npos) << zip.error().message;
+  }
+}
+
 TEST(OwnPack, StairsTurnWithTheirProperties) {
   const Json states = Json::parse(text_of_own("assets/minecraft/blockstates/oak_stairs.json"));
   EXPECT_EQ(states["variants"].size(), 40U);
