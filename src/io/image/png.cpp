@@ -79,19 +79,30 @@ Result<std::vector<std::byte>> encode_png(const PngImage& image, PngEffort effor
   return out;
 }
 
+namespace {
+
+/// The header of libpng's simplified interface, freed at the end of its scope.
+struct PngHeader {
+  png_image image{};
+  PngHeader() { image.version = PNG_IMAGE_VERSION; }
+  PngHeader(const PngHeader&) = delete;
+  PngHeader& operator=(const PngHeader&) = delete;
+  ~PngHeader() { png_image_free(&image); }
+};
+
+}  // namespace
+
 Result<PngImage> decode_png(std::span<const std::byte> file) {
-  png_image header{};
-  header.version = PNG_IMAGE_VERSION;
+  PngHeader kept;
+  png_image& header = kept.image;
   if (png_image_begin_read_from_memory(&header, file.data(), file.size()) == 0) {
     return make_error(ErrorCode::BadFormat, std::string("not a readable PNG: ") + header.message);
   }
   if (std::uint64_t{header.width} * header.height > (std::uint64_t{1} << 28)) {
-    png_image_free(&header);
     return make_error(ErrorCode::LimitExceeded, "the PNG has more than 2^28 pixels");
   }
   // Deflate expands a byte to at most 1,032 bytes, and a pixel takes at least a bit.
   if (std::uint64_t{header.width} * header.height > std::uint64_t{8} * 1032 * file.size()) {
-    png_image_free(&header);
     return make_error(ErrorCode::BadFormat, "not a readable PNG: it claims more pixels than its bytes can hold");
   }
   header.format = PNG_FORMAT_RGBA;

@@ -347,6 +347,37 @@ TEST_F(BlockPackStack, TexelsStayCompressedUntilTheyAreRead) {
   }
 }
 
+TEST(PackTextures, KeepNoPngThatIsLargerThanItsTexels) {
+  const auto texture = [](int frames) {
+    const std::string png = packs_test::png(
+        64,
+        [](int x, int y) {
+          const std::uint32_t bits = mix_bits(static_cast<std::uint32_t>(x + 64 * y));
+          const auto byte = [&](int shift) { return static_cast<std::uint8_t>((bits >> shift) % 16 * 17); };
+          return Rgba8{byte(0), byte(8), byte(16)};
+        },
+        frames);
+    const auto bytes = std::as_bytes(std::span(png));
+    auto made = texture_of_png("noise", {bytes.begin(), bytes.end()}, R"({"animation": {}})");
+    EXPECT_TRUE(made);
+    return std::pair(made->texture, png.size());
+  };
+  const auto [one, size] = texture(1);
+  EXPECT_LT(size, 64U * 64U * 4U);
+  EXPECT_FALSE(one.has_texels());
+  const auto [first_of_many, large] = texture(16);
+  EXPECT_GT(large, 64U * 64U * 4U);
+  EXPECT_TRUE(first_of_many.has_texels());
+  EXPECT_EQ(first_of_many, one);
+}
+
+TEST(PackTextures, ThrowIfTheirPngCannotBeDecodedAgain) {
+  const std::string png = packs_test::plain_png({1, 2, 3}, 64);
+  const auto bytes = std::as_bytes(std::span(png));
+  EXPECT_EQ(texels_of_png(bytes, {0, 0, 64, 64}).width, 64);
+  EXPECT_THROW(static_cast<void>(texels_of_png(bytes.first(bytes.size() / 2), {0, 0, 64, 64})), std::bad_alloc);
+}
+
 TEST(BlockPackInputs, CorpusMakesValidTypes) {
   std::size_t files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(QUOIN_SOURCE_DIR "/tests/corpus/packs")) {

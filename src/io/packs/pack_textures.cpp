@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <memory>
+#include <new>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -25,14 +26,6 @@ constexpr std::size_t kMaxAnimationBytes = std::size_t{1} << 20;
 constexpr int kNearlyClear = 5;
 constexpr int kNearlyOpaque = 250;
 
-/// A rectangle of an image, in pixels.
-struct Frame {
-  int x = 0;
-  int y = 0;
-  int width = 0;
-  int height = 0;
-};
-
 struct PngSize {
   std::uint32_t width = 0;
   std::uint32_t height = 0;
@@ -53,15 +46,15 @@ int whole_number(const Json& object, const char* key, int otherwise) {
 }
 
 /// Returns the first frame of an image.
-Frame first_frame(const AlphaImage& image, std::string_view animation) {
-  const Frame whole{0, 0, image.width, image.height};
+ImageFrame first_frame(const AlphaImage& image, std::string_view animation) {
+  const ImageFrame whole{0, 0, image.width, image.height};
   if (json_extent(animation, JsonComments::Allowed).depth > 16) return whole;
   const Json json = Json::parse(animation, nullptr, false, true);
   const auto found = json.is_object() ? json.find("animation") : json.end();
   if (!json.is_object() || found == json.end() || !found->is_object()) return whole;
   const int edge = std::min(image.width, image.height);
   const bool has_size = found->contains("width") || found->contains("height");
-  Frame frame = whole;
+  ImageFrame frame = whole;
   frame.width = std::clamp(whole_number(*found, "width", has_size ? image.width : edge), 1, image.width);
   frame.height = std::clamp(whole_number(*found, "height", has_size ? image.height : edge), 1, image.height);
   int index = 0;
@@ -85,7 +78,7 @@ int middle_of(int i, int size, int length) {
 }
 
 /// Returns a square image of a frame, with sides that textures can have.
-AlphaImage squared(AlphaImage image, const Frame& frame) {
+AlphaImage squared(AlphaImage image, const ImageFrame& frame) {
   const auto longest = static_cast<unsigned>(std::max(frame.width, frame.height));
   const int size = std::clamp(static_cast<int>(std::bit_ceil(longest)), kMinTextureSize, kMaxTextureSize);
   if (frame.width == size && frame.height == size && image.width == size && image.height == size) return image;
@@ -173,22 +166,29 @@ Result<PackTexture> texture_of_png(const std::string& name, std::vector<std::byt
   }
   auto image = read_alpha_image(png);
   if (!image) return image.error();
-  const Frame frame = first_frame(*image, animation);
+  const ImageFrame frame = first_frame(*image, animation);
   AlphaImage square = squared(std::move(*image), frame);
-  if (square.width < kDeferredTextureSize) return texture_of(name, std::move(square));
+  if (square.width < kDeferredTextureSize || png.size() >= square.rgba.size()) {
+    return texture_of(name, std::move(square));
+  }
   PackTexture made;
   made.alpha = settle_alpha(square);
   auto decode = [kept = std::make_shared<const std::vector<std::byte>>(std::move(png)), frame] {
-    auto again = read_alpha_image(*kept);
-    QUOIN_ASSERT(again, "an image that was decoded before");
-    AlphaImage texels = squared(std::move(*again), frame);
-    settle_alpha(texels);
-    return texels;
+    return texels_of_png(*kept, frame);
   };
   auto texture = Texture::deferred(name, square, std::move(decode));
   if (!texture) return texture.error();
   made.texture = std::move(*texture);
   return made;
+}
+
+AlphaImage texels_of_png(std::span<const std::byte> png, const ImageFrame& frame) {
+  auto image = read_alpha_image(png);
+  // libpng reports an allocation that failed as any other error.
+  if (!image) throw std::bad_alloc();
+  AlphaImage texels = squared(std::move(*image), frame);
+  settle_alpha(texels);
+  return texels;
 }
 
 TextureReader::Known TextureReader::read(const ResourceName& name) const {

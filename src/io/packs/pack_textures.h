@@ -28,7 +28,8 @@ struct PackTexture {
   FaceAlpha alpha = FaceAlpha::Opaque;
 };
 
-/// Textures with at least this side keep their PNG instead of their texels until these are read (Texture::deferred).
+/// Textures with at least this side keep their PNG instead of their texels until these are read (Texture::deferred), if
+/// it has fewer bytes than level 0.
 inline constexpr int kDeferredTextureSize = 64;
 
 /// Makes a texture of a PNG: its first frame, if `animation` is the text of its .mcmeta file with an animation. An
@@ -37,6 +38,18 @@ inline constexpr int kDeferredTextureSize = 64;
 /// Errors: BadFormat for images that are no PNG; LimitExceeded above 2^24 pixels, before it is decoded.
 [[nodiscard]] Result<PackTexture> texture_of_png(const std::string& name, std::vector<std::byte> png,
                                                  std::string_view animation = {});
+
+/// A rectangle of an image, in pixels.
+struct ImageFrame {
+  int x = 0;
+  int y = 0;
+  int width = 0;
+  int height = 0;
+};
+
+/// Returns the texels of a texture again, from the PNG of which texture_of_png made it. Requires: a frame inside the
+/// image. Errors: throws bad_alloc if the PNG cannot be decoded, since it was before.
+[[nodiscard]] AlphaImage texels_of_png(std::span<const std::byte> png, const ImageFrame& frame);
 
 /// One texture on a face of an element: the look, and the part that the face shows (ElementFace::part).
 struct FaceLayer {
