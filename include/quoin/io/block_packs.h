@@ -30,10 +30,12 @@ inline constexpr const char* kNoPack = "none";
 [[nodiscard]] std::vector<std::filesystem::path> packs_for_images(std::vector<std::filesystem::path> named);
 
 /// Returns a hash of a pack's content: 16 hexadecimal digits of a hash over the names, sizes and CRC-32 of the files
-/// below `assets`, in the order of their names. A zip file and the folder with its files have the same hash. Files
-/// above 64 MiB, which are never used, do not count.
+/// below `assets`, in the order of their names. A zip file and the folder with its files have the same hash. For a
+/// Luanti folder, the files are the tiles that BlockPacks uses, by their names without folders. Files that are never
+/// used do not count: those above 64 MiB, and those behind links out of the folder.
 /// Cost: reads only the directory of a zip file after opening it, and all files of a folder.
-/// Errors: those of BlockPacks::open; LimitExceeded for a folder with more than 1,048,576 files and folders or 2 GiB.
+/// Errors: those of BlockPacks::open; CannotRead for a link to a folder that contains it; LimitExceeded for a folder
+///         with more than 1,048,576 files and folders (100,000 for Luanti) or 2 GiB.
 [[nodiscard]] Result<std::string> hash_of_pack(const std::filesystem::path& path);
 
 /// Returns a part of kBuiltinPack as a zip file in the published format, for other programs or as the base of a pack:

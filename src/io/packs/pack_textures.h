@@ -47,8 +47,8 @@ struct ImageFrame {
   int height = 0;
 };
 
-/// Returns the texels of a texture again, from the PNG of which texture_of_png made it. Requires: a frame inside the
-/// image. Errors: throws bad_alloc if the PNG cannot be decoded, since it was before.
+/// Decodes the texels of a texture again, from the same PNG as texture_of_png. Requires: a frame inside the image.
+/// Errors: throws bad_alloc if the PNG cannot be decoded, since it was before.
 [[nodiscard]] AlphaImage texels_of_png(std::span<const std::byte> png, const ImageFrame& frame);
 
 /// One texture on a face of an element: the look, and the part that the face shows (ElementFace::part).

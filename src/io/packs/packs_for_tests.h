@@ -194,7 +194,8 @@ inline VoxelRegistry stack_types(int count) {
   return types.types();
 }
 
-/// Gives some blocks the looks of a pack. Returns false if a type is invalid. Their shapes are made in some states.
+/// Gives some blocks the looks of a pack. Returns false if a type is invalid, or if the report does not count the types
+/// and those that keep their look, or names none of these. Shapes are made in some states.
 inline bool makes_valid_looks(std::shared_ptr<const packs::PackFiles> files) {
   static const std::vector<VoxelProperties> types = [] {
     const auto type_of = [](std::string_view name, const std::vector<minecraft::Property>& properties) {
@@ -209,16 +210,19 @@ inline bool makes_valid_looks(std::shared_ptr<const packs::PackFiles> files) {
         type_of("minecraft:lava", {{"level", "2"}})};
   }();
   packs::BlockLooks looks(std::move(files));
+  std::size_t unchanged = 0;
   for (const VoxelProperties& type : types) {
     const VoxelProperties made = looks.applied(type);
     if (!validate_type(made)) return false;
+    if (made == type) ++unchanged;
     if (made.shapes.empty()) continue;
     for (std::uint32_t state = 0; state < 64; ++state) {
       const auto position = static_cast<std::uint16_t>(state % made.shapes.position_count());
       static_cast<void>(made.shapes.model(state, made.orientations.of(state), {.position = position}));
     }
   }
-  return !to_string(looks.report()).empty() || looks.report().types == types.size();
+  const BlockPackReport report = looks.report();
+  return report.types == types.size() && report.without_look == unchanged && (unchanged == 0 || !report.names.empty());
 }
 
 /// Reads any bytes as a zip file, and as the texts of a block state and of models, then a texture, separated by NUL.
