@@ -87,6 +87,9 @@ class BlockPacks {
   /// As above: the packs `zips` override the packs `paths`.
   [[nodiscard]] static Result<std::shared_ptr<BlockPacks>> open(std::span<const std::filesystem::path> paths,
                                                                 std::vector<std::vector<std::byte>> zips);
+  /// Returns opened packs as one stack, the lowest first. They share the files in memory with `packs`, so that these
+  /// can be parts of many stacks. kBuiltinPack counts as above.
+  [[nodiscard]] static std::shared_ptr<BlockPacks> stacked(std::span<const std::shared_ptr<BlockPacks>> packs);
   ~BlockPacks();
   BlockPacks(const BlockPacks&) = delete;
   BlockPacks& operator=(const BlockPacks&) = delete;

@@ -4,6 +4,7 @@
 #include <array>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <utility>
 
@@ -133,6 +134,10 @@ Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::span<const std::filesy
                     : std::shared_ptr<BlockPacks>(new BlockPacks(std::make_unique<Content>()));
 }
 
+std::shared_ptr<BlockPacks> BlockPacks::stacked(std::span<const std::shared_ptr<BlockPacks>> /*packs*/) {
+  return std::shared_ptr<BlockPacks>(new BlockPacks(std::make_unique<Content>()));
+}
+
 Result<std::string> hash_of_pack(const std::filesystem::path& /*path*/) {
   return packs_left_out();
 }
@@ -169,8 +174,10 @@ class LazyOwnPack final : public packs::PackFiles {
 }  // namespace
 
 struct BlockPacks::Content {
-  explicit Content(std::shared_ptr<const packs::PackFiles> files, std::shared_ptr<const packs::PackFiles> own = nullptr)
-      : looks(std::move(files), std::move(own)) {}
+  Content(std::shared_ptr<const packs::PackStack> stack, std::shared_ptr<const packs::PackFiles> own_pack)
+      : files(std::move(stack)), own(std::move(own_pack)), looks(files, own) {}
+  std::shared_ptr<const packs::PackStack> files;
+  std::shared_ptr<const packs::PackFiles> own;  // null: without kBuiltinPack
   packs::BlockLooks looks;
 };
 
@@ -183,6 +190,18 @@ Result<std::shared_ptr<BlockPacks>> BlockPacks::open(std::span<const std::filesy
   std::shared_ptr<const packs::PackFiles> own;
   if (has_own) own = std::make_shared<const LazyOwnPack>();
   return std::shared_ptr<BlockPacks>(new BlockPacks(std::make_unique<Content>(std::move(*files), std::move(own))));
+}
+
+std::shared_ptr<BlockPacks> BlockPacks::stacked(std::span<const std::shared_ptr<BlockPacks>> packs) {
+  std::vector<std::shared_ptr<const packs::PackFiles>> files;
+  std::shared_ptr<const packs::PackFiles> own;
+  for (const std::shared_ptr<BlockPacks>& opened : packs) {
+    const std::span all = opened->content_->files->packs();
+    files.insert(files.end(), all.begin(), all.end());
+    if (opened->content_->own != nullptr) own = opened->content_->own;
+  }
+  auto stack = std::make_shared<const packs::PackStack>(std::move(files));
+  return std::shared_ptr<BlockPacks>(new BlockPacks(std::make_unique<Content>(std::move(stack), std::move(own))));
 }
 
 Result<std::string> hash_of_pack(const std::filesystem::path& path) {

@@ -115,6 +115,8 @@ class PackStack final : public PackFiles {
   [[nodiscard]] bool has(std::string_view path) const override;
   [[nodiscard]] bool has_tiles() const override;
   [[nodiscard]] std::string identity() const override;
+  /// Returns the packs, the lowest first.
+  [[nodiscard]] std::span<const std::shared_ptr<const PackFiles>> packs() const { return packs_; }
 
  private:
   /// Reads a file of exactly this name.

@@ -1,5 +1,8 @@
+#include <algorithm>
 #include <array>
+#include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -152,89 +155,161 @@ Instance placed(const Instance& inner, const Instance& outer, bool is_alone) {
 }
 
 /// The resource packs of a scene: LoadOptions::packs for its own types, below them the packs that it names for a file.
+/// Each pack is in memory once. Limits: 2 GiB of zip files that the scene names, and 256 different lists of packs.
 class ScenePacks {
  public:
   /// `path`: the scene file.
   ScenePacks(const std::filesystem::path& path, const LoadOptions& options) : path_(path), options_(options) {}
 
   /// Gives types of the scene itself their looks. Errors: those of BlockPacks::open.
-  Status apply(VoxelRegistry& types) { return apply_stack({}, "", types); }
+  Status apply(VoxelRegistry& types) { return apply_stack({}, types); }
 
   /// Gives the types of a file that the scene names their looks. Leaves out packs that cannot be used, with a warning.
+  /// Only the last place of a repeated pack counts. Errors: LimitExceeded for too many lists.
   Status apply(const SceneFile::Source& source, VoxelRegistry& types, LoadedScene& loaded) {
-    std::vector<std::filesystem::path> usable;
-    std::string names;
+    std::vector<Named> usable;
     for (const SceneFile::Pack& pack : source.packs) {
       if (!options_.scene_packs) break;
       auto found = find(pack, loaded);
-      if (!found) continue;
-      usable.push_back(std::move(*found));
-      names += printable(pack.file) + ": ";
+      if (found == nullptr) continue;
+      std::erase_if(usable, [&](const Named& other) { return other.pack == found; });
+      usable.push_back({std::move(found), printable(pack.file)});
     }
-    return apply_stack(std::move(usable), names, types);
+    return apply_stack(usable, types);
   }
 
   /// Adds a warning for each stack of packs that lacks something.
   void report(LoadedScene& loaded) const {
-    for (const auto& [list, stack] : opened_) {
-      const std::string line = stack.packs == nullptr ? "" : to_string(stack.packs->report());
+    for (const Stack& stack : stacks_) {
+      const std::string line = to_string(stack.looks->report());
       if (!line.empty()) loaded.warnings.push_back(stack.names + line);
     }
   }
 
  private:
+  using Pack = std::shared_ptr<BlockPacks>;
+  enum class NamedBy : std::uint8_t { Options, Scene };
+  struct Named {
+    Pack pack;
+    std::string name;
+  };
   struct Stack {
-    std::shared_ptr<BlockPacks> packs = nullptr;  // null: none
-    std::string names{};                          // of the scene's packs, each with a colon
+    std::vector<Pack> packs;
+    Pack looks;
+    std::string names;  // of the scene's packs, each with a colon
+  };
+  struct Opened {
+    Result<Pack> pack;
+    std::optional<Result<std::string>> hash{};
   };
 
-  Status apply_stack(std::vector<std::filesystem::path> paths, const std::string& names, VoxelRegistry& types) {
-    paths.insert(paths.end(), options_.packs.begin(), options_.packs.end());
-    const auto [at, is_new] = opened_.try_emplace(paths);
-    Stack& stack = at->second;
-    if (is_new && !(paths.empty() && options_.pack_zips.empty())) {
-      auto packs = BlockPacks::open(paths, options_.pack_zips);
-      if (!packs) return packs.error();
-      stack = {std::move(*packs), names};
+  Status apply_stack(const std::vector<Named>& of_scene, VoxelRegistry& types) {
+    if (Status opened = open_options(); !opened) return opened;
+    std::vector<Pack> packs = of_options_;
+    std::string names;
+    // A pack of the options is above the same pack of the scene.
+    auto above = packs.begin();
+    for (const Named& named : of_scene) {
+      if (std::ranges::find(of_options_, named.pack) != of_options_.end()) continue;
+      above = packs.insert(above, named.pack) + 1;
+      names += named.name + ": ";
     }
-    if (stack.packs != nullptr) stack.packs->apply(types);
+    if (packs.empty()) return {};
+    auto stack = std::ranges::find(stacks_, packs, &Stack::packs);
+    if (stack == stacks_.end()) {
+      if (stacks_.size() == kMaxStacks) {
+        return make_error(ErrorCode::LimitExceeded, "the scene file has more than " + std::to_string(kMaxStacks) +
+                                                        " different lists of resource packs");
+      }
+      Pack looks = BlockPacks::stacked(packs);
+      stack = stacks_.insert(stacks_.end(), {std::move(packs), std::move(looks), std::move(names)});
+    }
+    stack->looks->apply(types);
     return {};
   }
 
-  /// Returns the path of a pack that can be used, else nullopt and adds a warning when it is first asked for.
-  std::optional<std::filesystem::path> find(const SceneFile::Pack& pack, LoadedScene& loaded) {
+  /// Opens the packs of the options, once.
+  Status open_options() {
+    if (has_options_) return {};
+    for (const std::filesystem::path& path : options_.packs) {
+      const Opened& opened = open(path, NamedBy::Options);
+      if (!opened.pack) return opened.pack.error();
+      std::erase(of_options_, *opened.pack);
+      of_options_.push_back(*opened.pack);
+    }
+    if (!options_.pack_zips.empty()) {
+      auto zips = BlockPacks::open(options_.pack_zips);
+      if (!zips) return zips.error();
+      of_options_.push_back(std::move(*zips));
+    }
+    has_options_ = true;
+    return {};
+  }
+
+  /// Opens a pack, or returns it if it is open.
+  Opened& open(const std::filesystem::path& path, NamedBy named_by) {
+    std::error_code error;
+    std::filesystem::path real = path == kBuiltinPack ? path : std::filesystem::canonical(path, error);
+    if (error) real = path;
+    const auto known = opened_.find(real);
+    if (known != opened_.end()) return known->second;
+    const bool is_zip = path != kBuiltinPack && std::filesystem::is_regular_file(real, error);
+    const std::uint64_t size = is_zip ? std::filesystem::file_size(real, error) : 0;
+    const bool counts = !error && named_by == NamedBy::Scene;  // users may name as many packs as they like
+    if (counts && size > kMaxZipBytes - zip_bytes_) {
+      return add(real, make_error(ErrorCode::LimitExceeded,
+                                  "the packs of the scene file together have more than " +
+                                      std::to_string(kMaxZipBytes) + " bytes",
+                                  path.string()));
+    }
+    Opened& opened = add(real, BlockPacks::open(std::span(&path, 1)));
+    if (opened.pack && counts) zip_bytes_ += size;
+    return opened;
+  }
+  Opened& add(const std::filesystem::path& real, Result<Pack> pack) {
+    return opened_.emplace(real, Opened{std::move(pack)}).first->second;
+  }
+
+  /// Returns a pack that can be used, else null and adds a warning when it is first asked for.
+  Pack find(const SceneFile::Pack& pack, LoadedScene& loaded) {
     const auto [at, is_new] = found_.try_emplace({pack.file, pack.hash});
     if (!is_new) return at->second;
-    auto path = check(pack);
-    if (path) {
-      at->second = std::move(*path);
+    auto found = check(pack);
+    if (found) {
+      at->second = std::move(*found);
     } else {
       loaded.warnings.push_back("cannot use the resource pack \"" + printable(pack.file) +
-                                "\" of the scene file: " + to_string(path.error()));
+                                "\" of the scene file: " + to_string(found.error()));
       loaded.unused_packs.push_back(pack.file);
     }
     return at->second;
   }
 
-  [[nodiscard]] Result<std::filesystem::path> check(const SceneFile::Pack& pack) const {
-    if (pack.file == kBuiltinPack) return std::filesystem::path(kBuiltinPack);
-    auto path = sidecar_path(path_, pack.file, options_.sidecar_files);
-    if (!path) return path;
-    if (pack.hash.empty()) {
-      const auto opened = BlockPacks::open(std::span(&*path, 1));
-      return opened ? path : opened.error();
-    }
-    const auto hash = hash_of_pack(*path);
+  Result<Pack> check(const SceneFile::Pack& pack) {
+    if (pack.file == kBuiltinPack) return open(kBuiltinPack, NamedBy::Scene).pack;
+    const auto path = sidecar_path(path_, pack.file, options_.sidecar_files);
+    if (!path) return path.error();
+    Opened& opened = open(*path, NamedBy::Scene);
+    if (!opened.pack || pack.hash.empty()) return opened.pack;
+    if (!opened.hash) opened.hash = hash_of_pack(*path);
+    const Result<std::string>& hash = *opened.hash;
     if (!hash) return hash.error();
-    if (*hash == pack.hash) return path;
+    if (*hash == pack.hash) return opened.pack;
     return make_error(ErrorCode::BadFormat, "it has changed: its hash is " + *hash + ", not " + pack.hash +
                                                 "; without \"hash\" the scene file accepts any content");
   }
 
+  static constexpr std::uint64_t kMaxZipBytes = std::uint64_t{2} << 30;  // of all packs that the scene names
+  static constexpr std::size_t kMaxStacks = 256;
+
   const std::filesystem::path& path_;
   const LoadOptions& options_;
-  std::map<std::vector<std::filesystem::path>, Stack> opened_;
-  std::map<std::pair<std::string, std::string>, std::optional<std::filesystem::path>> found_;  // by path and hash
+  std::map<std::filesystem::path, Opened> opened_;             // by canonical path
+  std::uint64_t zip_bytes_ = 0;                                // of the opened packs that only the scene names
+  std::map<std::pair<std::string, std::string>, Pack> found_;  // by path and hash; null: cannot be used
+  std::vector<Pack> of_options_;
+  bool has_options_ = false;
+  std::vector<Stack> stacks_;
 };
 
 Result<LoadedScene> put_together(SceneFile& file, const std::filesystem::path& path, const LoadOptions& options,

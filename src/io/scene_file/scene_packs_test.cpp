@@ -1,3 +1,4 @@
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -253,6 +254,89 @@ TEST_F(ScenePacksTest, WarnOfFilesThatAreNoPacks) {
       ASSERT_EQ(loaded->warnings.size(), 1U) << name;
       EXPECT_NE(loaded->warnings[0].find(name), std::string::npos) << loaded->warnings[0];
     }
+  }
+}
+
+TEST_F(ScenePacksTest, CountRepeatedPacksAtTheirLastPlace) {
+  write_zip(in_scene("red.zip"), stone_pack(kRed));
+  PackTexts texts = stone_pack(kBlue);
+  texts.erase("assets/minecraft/blockstates/stone.json");
+  texts["assets/minecraft/textures/block/stone.png"] = "no image";
+  write_zip(in_scene("bad.zip"), texts);
+  fs::create_symlink("bad.zip", in_scene("link.zip"));
+  const auto loaded = load({{"red.zip"}, {"bad.zip"}, {"red.zip"}, {"bad.zip"}, {"link.zip"}});
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  ASSERT_EQ(loaded->warnings.size(), 1U);
+  EXPECT_TRUE(loaded->warnings[0].starts_with("red.zip: link.zip: resource packs: ")) << loaded->warnings[0];
+  const auto turned = load({{"red.zip"}, {"bad.zip"}, {"red.zip"}});
+  ASSERT_TRUE(turned);
+  EXPECT_TRUE(turned->warnings.empty());
+  EXPECT_TRUE(is_textured(stone_of(*turned), kRed)) << "red.zip is the highest";
+}
+
+TEST_F(ScenePacksTest, TogetherHaveAtMostTwoGibibytes) {
+  write_zip(in_scene("red.zip"), stone_pack(kRed));
+  // A file without blocks on the disk: one alone would be read.
+  std::ofstream(in_scene("large.zip")) << "PK";
+  fs::resize_file(in_scene("large.zip"), std::uint64_t{2} << 30);
+  const auto loaded = load({{"red.zip"}, {"large.zip"}, {"large.zip", "0123456789abcdef"}});
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  ASSERT_EQ(loaded->warnings.size(), 2U) << "one with a hash and one without";
+  for (const std::string& warning : loaded->warnings) {
+    EXPECT_NE(warning.find("the packs of the scene file together have more than 2147483648 bytes"), std::string::npos)
+        << warning;
+  }
+  EXPECT_TRUE(is_textured(stone_of(*loaded), kRed));
+}
+
+TEST_F(ScenePacksTest, HaveAtMost256Lists) {
+  // 17 packs have 272 lists of two.
+  std::vector<std::string> names;
+  for (int i = 0; i < 17; ++i) {
+    names.push_back("red" + std::to_string(i) + ".zip");
+    write_zip(in_scene(names.back()), stone_pack(kRed));
+  }
+  SceneFile file;
+  const auto load_with = [&](std::size_t count) {
+    for (const std::string& low : names) {
+      for (const std::string& high : names) {
+        const std::string id = low + high;
+        if (low == high || file.sources.size() == count) continue;
+        file.sources.push_back({id, "house.schem", {{low}, {high}}});
+        file.placements.push_back({.instance = {}, .source = id});
+      }
+    }
+    EXPECT_EQ(file.sources.size(), count);
+    EXPECT_TRUE(write_scene_file(file, in_scene("scene.json")));
+    file.sources.clear();
+    file.placements.clear();
+    return load_scene(in_scene("scene.json"));
+  };
+  const auto most = load_with(256);
+  ASSERT_TRUE(most) << to_string(most.error());
+  const auto more = load_with(257);
+  ASSERT_FALSE(more);
+  EXPECT_EQ(more.error().code, ErrorCode::LimitExceeded);
+  EXPECT_NE(more.error().message.find("more than 256 different lists of resource packs"), std::string::npos);
+}
+
+TEST_F(ScenePacksTest, WarnOfPacksThatHaveTheirHashButCannotBeOpened) {
+  // The hash of a Luanti folder counts more files than are opened.
+  fs::create_directories(in_scene("mod/textures"));
+  std::ofstream(in_scene("mod/mod.conf")) << "name = mod";
+  for (int folder = 0; folder < 10; ++folder) {
+    const fs::path inner = in_scene("mod/" + std::to_string(folder));
+    fs::create_directories(inner);
+    std::ofstream(inner / "0") << "";
+    for (int i = 1; i < 10'000; ++i) fs::create_hard_link(inner / "0", inner / std::to_string(i));
+  }
+  const auto hash = hash_of_pack(in_scene("mod"));
+  ASSERT_TRUE(hash) << to_string(hash.error());
+  for (const std::string& wanted : {*hash, std::string()}) {
+    const auto loaded = load({{"mod", wanted}});
+    ASSERT_TRUE(loaded) << to_string(loaded.error());
+    ASSERT_EQ(loaded->warnings.size(), 1U);
+    EXPECT_NE(loaded->warnings[0].find("more than 100,000 files"), std::string::npos) << loaded->warnings[0];
   }
 }
 
