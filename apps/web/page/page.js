@@ -70,7 +70,7 @@ function newWorker() {
     jobs = new Map();
   };
   // `load` reports the error.
-  if (file) ask('keep', { bytes: file.bytes, heights: file.heights, packs: packsOf() }).catch(() => {});
+  if (file) ask('keep', { bytes: file.bytes, heights: file.heights, packs: packsOf(packs) }).catch(() => {});
 }
 
 /** `tell`: progress callback of long tasks. */
@@ -301,8 +301,15 @@ async function heightsOf(name) {
   return { encoding: $('encoding').value, metresPerPixel: $('metres').valueAsNumber };
 }
 
-/** Returns the packs for `load`: the dropped ones with Quoin's own pack below, or none. */
-const packsOf = () => (packs.length === 0 ? [] : ['builtin', ...packs.map(({ bytes }) => bytes)]);
+/** Returns the packs for `load`: those of a list, with Quoin's own pack below. */
+const packsOf = (list) => ['builtin', ...list.map(({ bytes }) => bytes)];
+
+/** Uses packs from now on, and names them in the panel. */
+function setPacks(list) {
+  packs = list;
+  $('packs').hidden = packs.length === 0;
+  $('packs').querySelector('span').textContent = packs.map(({ name }) => name).join(', ');
+}
 
 /** Returns true if the file was opened and is shown. */
 async function open(name, bytes, isCurrent) {
@@ -315,18 +322,20 @@ async function open(name, bytes, isCurrent) {
   return read({ name, bytes, heights }, isCurrent);
 }
 
-/** Reads a file and shows it. `keepsView`: it is shown already, and is read again. */
-async function read({ name, bytes, heights }, isCurrent, keepsView = false) {
+/** Reads a file and shows it. `keepsView`: it is shown already, and is read again. `used`: the packs for its blocks,
+ *  which are set once the file is shown. */
+async function read({ name, bytes, heights }, isCurrent, { keepsView = false, used = packs } = {}) {
   const began = performance.now();
   say(`Reading ${name} ...`);
   marched?.stop();
   if (jobs.size > 0 || worker.hasFailed) newWorker();
   try {
     const tell = (fraction) => say(`Reading ${name}: ${percent(fraction)} ...`);
-    const answer = await ask('load', { bytes, heights, packs: packsOf() }, tell);
+    const answer = await ask('load', { bytes, heights, packs: packsOf(used) }, tell);
     if (!await show(answer.glb.slice(), isCurrent)) return false;
     glb = answer.glb;
     file = { name, bytes, heights };
+    setPacks(used);
     describe(name, answer);
     resize();
     if (keepsView) {
@@ -360,26 +369,24 @@ async function read({ name, bytes, heights }, isCurrent, keepsView = false) {
 const isPackName = (name) => /\.(zip|jar)$/i.test(name);
 
 /** Returns true if the packs can be read. */
-async function checkPacks() {
+async function checkPacks(list, isCurrent) {
   try {
-    await ask('check', { packs: packsOf() });
-    return true;
+    await ask('check', { packs: packsOf(list) });
+    return isCurrent();
   } catch (error) {
-    say(`${packs.at(-1)?.name}: ${error.message}`, true);
+    if (isCurrent()) say(`${list.at(-1)?.name ?? 'Packs'}: ${error.message}`, true);
     return false;
   }
 }
 
-/** Uses other packs, and reads the current file again. If that fails, the packs stay as they were. */
+/** Uses other packs, and reads the current file again. The packs stay as they were if that fails, or if another file is
+ *  chosen meanwhile. */
 async function usePacks(wanted, isCurrent) {
-  const before = packs;
-  packs = wanted;
+  if (!await checkPacks(wanted, isCurrent)) return false;
   const hasBlocks = file !== undefined && file.heights === undefined;
-  const isUsed = await checkPacks() && (!hasBlocks || await read(file, isCurrent, true));
-  if (!isUsed && packs === wanted) packs = before;
-  $('packs').hidden = packs.length === 0;
-  $('packs').querySelector('span').textContent = packs.map(({ name }) => name).join(', ');
-  return isUsed;
+  if (hasBlocks) return read(file, isCurrent, { keepsView: true, used: wanted });
+  setPacks(wanted);
+  return true;
 }
 
 /** Adds a pack above the others; a pack of the same name replaces the earlier one. */

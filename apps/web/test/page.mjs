@@ -196,6 +196,7 @@ try {
   await drop({ name: 'house.schem', bytes: await readFile(join(corpus, 'cases/schem-bamboo-is-glass.schem')) });
   await shown('house.schem');
   const plain = await download('#glb');
+  check(plain.bytes.includes('image/png'), 'without packs the blocks have textures of the own pack');
   const saysOf = (text) => tab.waitForFunction(
     (start) => document.querySelector('#status').textContent.startsWith(start), text, { timeout: 60_000 });
   await drop({ name: 'stone.zip', bytes: stonePack(8) });
@@ -210,6 +211,23 @@ try {
   await shown('house.schem');
   check((await download('#glb')).bytes.equals(plain.bytes), 'without packs the blocks are as before');
   check(!(await tab.isVisible('#packs')), 'and none is named');
+  // A file is dropped while a pack is checked.
+  await tab.evaluate(() => {
+    const post = Worker.prototype.postMessage;
+    Worker.prototype.postMessage = function postLater(message, ...more) {
+      if (message.name !== 'check') return post.call(this, message, ...more);
+      window.quoinChecks = (window.quoinChecks ?? 0) + 1;
+      setTimeout(() => post.call(this, message, ...more), 3000);
+    };
+  });
+  await drop({ name: 'stone.zip', bytes: stonePack(8) });
+  await tab.waitForFunction(() => window.quoinChecks === 1);
+  await drop({ name: 'other.schem', bytes: await readFile(join(corpus, 'cases/schem-bamboo-is-glass.schem')) });
+  await shown('other.schem');
+  await tab.waitForTimeout(3500);
+  check(/^other.schem: read/.test(await status()), `a pack is left out for a later file: ${await status()}`);
+  check(!(await tab.isVisible('#packs')), 'and is not named');
+  check((await download('#glb')).bytes.equals(plain.bytes), 'and not used');
   await tab.setInputFiles('#other', file);
   await shown(basename(file));
 
