@@ -57,6 +57,10 @@ Result<FileFormat> format_to_write(const std::filesystem::path& path) {
       path.string());
 }
 
+std::string unusable(const Error& error) {
+  return "cannot use the chosen resource pack: " + to_string(error);
+}
+
 }  // namespace
 
 bool can_write(const std::filesystem::path& path) {
@@ -98,13 +102,14 @@ Result<std::unique_ptr<Document>> Document::open(const std::filesystem::path& pa
   }
   LoadOptions as_saved = options;
   as_saved.show_hidden = false;
+  if (file->format == FileFormat::Scene) return open_scene_file(*file, std::move(as_saved), progress, fallback, stamp);
   as_saved.packs.clear();  // so that the types as read are known
   auto loaded = load_scene(*file, as_saved, {}, progress);
   if (!loaded) return loaded.error();
   const VoxelRegistry plain = loaded->scene.types;
   auto packed = packed_types(plain, options.packs);
   if (!packed && fallback == PackFallback::OwnPack) {
-    loaded->warnings.push_back("cannot use the chosen resource pack: " + to_string(packed.error()));
+    loaded->warnings.push_back(unusable(packed.error()));
     packed = packed_types(plain, packs_for_images({}));
   }
   if (!packed) return packed.error();
@@ -116,8 +121,27 @@ Result<std::unique_ptr<Document>> Document::open(const std::filesystem::path& pa
   return document;
 }
 
+Result<std::unique_ptr<Document>> Document::open_scene_file(const DetectedFile& file, LoadOptions options,
+                                                            const Progress& progress, PackFallback fallback,
+                                                            const std::optional<FileStamp>& stamp) {
+  std::string warning;
+  if (fallback == PackFallback::OwnPack) {
+    if (const auto opened = BlockPacks::open(options.packs); !opened) {
+      warning = unusable(opened.error());
+      options.packs = packs_for_images({});
+    }
+  }
+  auto loaded = load_scene(file, options, {}, progress);
+  if (!loaded) return loaded.error();
+  if (!warning.empty()) loaded->warnings.insert(loaded->warnings.begin(), std::move(warning));
+  auto document = std::make_unique<Document>(std::move(*loaded), file.path);
+  document->is_scene_file_ = true;
+  document->stamp_ = stamp;
+  return document;
+}
+
 void Document::set_looks(const VoxelRegistry& types) {
-  QUOIN_ASSERT(world_ == nullptr && types.size() == plain_types_.size(), "types made of the plain ones");
+  QUOIN_ASSERT(plain_types() != nullptr && types.size() == plain_types_.size(), "types made of the plain ones");
   VoxelRegistry& now = loaded_.scene.types;
   for (std::size_t i = 1; i < types.size(); ++i) {
     const auto type = static_cast<VoxelType>(i);

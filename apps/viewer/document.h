@@ -11,6 +11,7 @@
 
 #include <quoin/core/progress.h>
 #include <quoin/io/file.h>
+#include <quoin/io/formats.h>
 #include <quoin/io/vox.h>
 #include <quoin/scene/scene_faces.h>
 #include <quoin/scene/scene_query.h>
@@ -61,8 +62,11 @@ class Document {
   [[nodiscard]] WorldWindow* world() { return world_.get(); }
   [[nodiscard]] const WorldWindow* world() const { return world_.get(); }
   /// Returns the types as read, before LoadOptions::packs gave them looks. Null for a world on disk, whose file stores
-  /// its looks.
-  [[nodiscard]] const VoxelRegistry* plain_types() const { return world_ ? nullptr : &plain_types_; }
+  /// its looks, and for a scene file (reopens_for_looks).
+  [[nodiscard]] const VoxelRegistry* plain_types() const { return world_ || is_scene_file_ ? nullptr : &plain_types_; }
+  /// Returns true if the file must be read again to show the looks of other packs: a scene file can name packs, which
+  /// form one stack with those of LoadOptions.
+  [[nodiscard]] bool reopens_for_looks() const { return is_scene_file_; }
   /// Replaces the looks of the types that were read. Types that the user added stay. Not an undo step, and no change to
   /// save. Requires: plain_types() is not null, and `types` were made of them (packed_types).
   void set_looks(const VoxelRegistry& types);
@@ -144,6 +148,10 @@ class Document {
     DVec3 last_point{0.0};
   };
 
+  [[nodiscard]] static Result<std::unique_ptr<Document>> open_scene_file(const DetectedFile& file, LoadOptions options,
+                                                                         const Progress& progress,
+                                                                         PackFallback fallback,
+                                                                         const std::optional<FileStamp>& stamp);
   [[nodiscard]] Scene& edited_scene() { return world_ ? world_->scene() : loaded_.scene; }
   [[nodiscard]] Status write_world(const std::filesystem::path& path, std::vector<std::string>& warnings,
                                    const Progress& progress) const;
@@ -154,6 +162,7 @@ class Document {
 
   LoadedScene loaded_;                  // unused if this is a world
   VoxelRegistry plain_types_;           // of `loaded_` as read, without packs
+  bool is_scene_file_ = false;          // as opened
   std::unique_ptr<WorldWindow> world_;  // null if this is not a world
   bool has_failed_ = false;             // the world's last save
   SceneFaces faces_;

@@ -15,6 +15,7 @@
 #include <gtest/gtest.h>
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
+#include <quoin/io/scene_file.h>
 
 #include "io/vox/vox_for_tests.h"
 #include "loader.h"
@@ -451,6 +452,53 @@ TEST(Document, FallsBackToTheOwnPackWithAWarning) {
   ASSERT_EQ((*document)->loaded().warnings.size(), 1U);
   EXPECT_NE((*document)->loaded().warnings[0].find("absent.jar"), std::string::npos);
   EXPECT_FALSE((*document)->scene().types[1].faces.empty());
+}
+
+TEST(Document, ShowsSceneFilesThatNamePacksAsLoadSceneDoes) {
+  const ScratchFolder folder("scene_packs");
+  write_house(folder);
+  const auto textures = write_stone_pack(folder, "textures", 16);
+  std::filesystem::remove_all(textures / "assets/minecraft/blockstates");
+  std::filesystem::remove_all(textures / "assets/minecraft/models");
+  const auto half = write_stone_pack(folder, "half", 8);
+  std::filesystem::remove_all(half / "assets/minecraft/textures");
+  SceneFile file;
+  file.sources.push_back({"house", "house.schem", {{"textures"}}});
+  file.placements.push_back({.instance = {}, .source = "house"});
+  const auto path = folder.file("scene.json");
+  ASSERT_TRUE(write_scene_file(file, path));
+
+  const LoadOptions with_half{.packs = {half}};
+  const LoadOptions with_own{.packs = packs_for_images({})};
+  LoadOptions none;
+  none.scene_packs = false;
+  for (const LoadOptions& options : {with_half, with_own, none}) {
+    const auto loaded = load_scene(path, options);
+    ASSERT_TRUE(loaded) << to_string(loaded.error());
+    const auto document = Document::open(path, options);
+    ASSERT_TRUE(document) << to_string(document.error());
+    EXPECT_TRUE((*document)->reopens_for_looks());
+    EXPECT_EQ((*document)->plain_types(), nullptr);
+    EXPECT_EQ((*document)->loaded().warnings, loaded->warnings);
+    const VoxelRegistry& types = (*document)->scene().types;
+    ASSERT_EQ(types.size(), loaded->scene.types.size());
+    EXPECT_EQ(types[1].colour, loaded->scene.types[1].colour);
+    EXPECT_TRUE(types[1].shapes == loaded->scene.types[1].shapes);
+    EXPECT_EQ(types[1].faces.empty(), loaded->scene.types[1].faces.empty());
+  }
+  const auto document = Document::open(path, with_half);
+  ASSERT_TRUE(document);
+  EXPECT_TRUE((*document)->loaded().warnings.empty()) << (*document)->loaded().warnings.front();
+  EXPECT_FALSE((*document)->scene().types[1].shapes.empty()) << "the model of one pack";
+  EXPECT_EQ((*document)->scene().types[1].colour, (Rgba8{200, 40, 40, 255})) << "the texture of the other";
+
+  const LoadOptions absent{.packs = {folder.file("absent.jar"), kBuiltinPack}};
+  EXPECT_FALSE(Document::open(path, absent));
+  const auto fallback = Document::open(path, absent, {}, {}, PackFallback::OwnPack);
+  ASSERT_TRUE(fallback) << to_string(fallback.error());
+  ASSERT_FALSE((*fallback)->loaded().warnings.empty());
+  EXPECT_NE((*fallback)->loaded().warnings[0].find("absent.jar"), std::string::npos);
+  EXPECT_EQ((*fallback)->scene().types[1].colour, (Rgba8{200, 40, 40, 255}));
 }
 
 TEST(Document, ReportsUnsupportedFeaturesOnce) {

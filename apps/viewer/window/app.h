@@ -143,10 +143,11 @@ class App {
   bool is_running_ = true;
   std::vector<WantedImage> wanted_;
   std::optional<ViewRequest> asked_;
-  bool has_seen_chunks_ = true;     // an image arrived since chunks of the world were last moved
-  std::optional<Camera> unframed_;  // the camera of a small world until all of it is loaded
-  std::string reported_saving_;     // the current error of saving the world, already shown
-  std::string reported_error_;      // the current error of the backend, already shown; empty: none
+  bool has_seen_chunks_ = true;        // an image arrived since chunks of the world were last moved
+  std::optional<Camera> unframed_;     // the camera of a small world until all of it is loaded
+  std::optional<Camera> kept_camera_;  // of a file that is read again
+  std::string reported_saving_;        // the current error of saving the world, already shown
+  std::string reported_error_;         // the current error of the backend, already shown; empty: none
   std::optional<SDL_Event> postponed_;
   int frames_left_ = 3;
   Clock::time_point last_frame_ = Clock::now();

@@ -76,6 +76,7 @@ void App::load(const std::filesystem::path& path) {
     state_.loader->cancel();
     abandoned_.push_back(std::move(state_.loader));
   }
+  kept_camera_.reset();
   const Document& now = *state_.open.document;
   // An open world would block opening the same file again.
   if (now.world() != nullptr && is_same_file(path, now.path()) && save_world()) close_document();
@@ -129,6 +130,11 @@ void App::take_packed() {
     state_.stats.is_settled = false;
   }
   if (!looks.warning.empty()) state_.report(looks.warning);
+  const Document& now = *state_.open.document;
+  if (!now.reopens_for_looks()) return;
+  if (now.is_dirty()) return state_.report("save the changes and open the scene file again to see the other blocks");
+  load(now.path());
+  kept_camera_ = state_.camera.camera();
 }
 
 void App::take_loaded() {
@@ -195,6 +201,8 @@ void App::adopt(OpenDocument opened) {
     } else if (state_.has_named_packs && options_.screenshot.empty()) {
       state_.report("--pack has no effect on this world, which stores its looks; quoin convert --pack changes them");
     }
+  } else if (kept_camera_) {
+    look_through(*kept_camera_);
   } else if (loaded.camera) {
     look_through(*loaded.camera);
   } else {
