@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 #include <quoin/io/file.h>
 #include <quoin/io/image_files.h>
+#include <quoin/io/scene_file.h>
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render/path_tracer.h>
 
@@ -285,35 +286,96 @@ TEST_F(ViewerTest, SavesImageOfJustChosenMode) {
   EXPECT_EQ(shot->rgb, develop(*image, develop_options(request)).value().rgb);
 }
 
-// The menu Blocks, with one client.
-TEST_F(ViewerTest, OffersInstalledClients) {
+/// Sets HOME to a folder during its lifetime.
+class HomeFolder {
+ public:
+  explicit HomeFolder(const std::filesystem::path& home) {
+    if (const char* const before = std::getenv("HOME")) before_ = before;
+    ::setenv("HOME", home.c_str(), 1);
+  }
+  HomeFolder(const HomeFolder&) = delete;
+  HomeFolder& operator=(const HomeFolder&) = delete;
+  ~HomeFolder() { ::setenv("HOME", before_.c_str(), 1); }
+
+ private:
+  std::string before_;
+};
+
+/// Opens a file and chooses the only client in the menu Blocks. If `image` is not empty, then saves an image, which must
+/// get that name.
+Status choose_client(const ViewerOptions& given, const std::filesystem::path& image = {}) {
   using std::chrono::milliseconds;
-  ::setenv("XDG_CONFIG_HOME", folder_.file("config").c_str(), 1);
-  const char* const home = std::getenv("HOME");
-  const std::string home_before = home == nullptr ? "" : home;
-  ::setenv("HOME", folder_.file("home").c_str(), 1);
-  const auto jar = install_client(folder_);
-  ViewerOptions given = options(640, 400);
-  given.file = write_house(folder_);
-  given.is_bare = false;
-  given.screenshot.clear();
   // The menu and its item with the usual font, and with others.
   constexpr std::array<std::array<int, 2>, 4> kPlaces{{{163, 88}, {163, 95}, {150, 85}, {180, 100}}};
   std::size_t clicks = 0;
+  bool has_asked = false;
   auto start = std::chrono::steady_clock::now();
   const Deadline deadline;
-  const Status status = run_viewer(given, [&] {
-    if (!is_open("house.schem")) start = std::chrono::steady_clock::now();
+  return run_viewer(given, [&] {
+    if (clicks == 0 && !is_open(given.file.filename().string())) start = std::chrono::steady_clock::now();
     const auto passed = std::chrono::steady_clock::now() - start;
     if (clicks < 2 * kPlaces.size() && passed > milliseconds(300) * (clicks + 1)) {
       const auto [x, y] = kPlaces.at(clicks / 2);
       click(x, clicks++ % 2 == 0 ? 11 : y, 1);
     }
-    return passed > milliseconds(300) * (2 * kPlaces.size() + 6) || deadline.is_over();
+    const bool is_late = passed > milliseconds(300) * (2 * kPlaces.size() + 6);
+    if (is_late && !image.empty() && !std::exchange(has_asked, true)) press(SDLK_F12);
+    return (is_late && (image.empty() || std::filesystem::exists(image))) || deadline.is_over();
   });
-  ::setenv("HOME", home_before.c_str(), 1);
+}
+
+TEST_F(ViewerTest, OffersInstalledClients) {
+  ::setenv("XDG_CONFIG_HOME", folder_.file("config").c_str(), 1);
+  const HomeFolder home(folder_.file("home"));
+  const auto jar = install_client(folder_);
+  ViewerOptions given = options(640, 400);
+  given.file = write_house(folder_);
+  given.is_bare = false;
+  given.screenshot.clear();
+  const Status status = choose_client(given);
   ASSERT_TRUE(status) << to_string(status.error());
   EXPECT_EQ(read_settings(settings_path()).pack, jar.string());
+}
+
+TEST_F(ViewerTest, ReadsSceneFilesAgainForAnotherPack) {
+  ::setenv("XDG_CONFIG_HOME", folder_.file("config").c_str(), 1);
+  const HomeFolder home(folder_.file("home"));
+  const WorkingFolder inside(folder_.file(""));
+  const auto jar = install_client(folder_);
+  write_house(folder_);
+  write_stone_pack(folder_, "textures", 16);
+  std::filesystem::remove_all(folder_.file("textures/assets/minecraft/models"));
+  std::filesystem::remove_all(folder_.file("textures/assets/minecraft/blockstates"));
+  SceneFile file;
+  file.sources.push_back({"house", "house.schem", {{"textures"}}});
+  file.placements.push_back({.instance = {}, .source = "house"});
+  ViewerOptions given = options(640, 400);
+  given.file = folder_.file("scene.json");
+  ASSERT_TRUE(write_scene_file(file, given.file));
+  given.is_bare = false;
+  given.screenshot.clear();
+  // Returns an image after opening the file with the pack of the settings.
+  const auto image_of = [&](const std::filesystem::path& path, const std::string& pack) {
+    Settings settings;
+    settings.pack = pack;
+    EXPECT_TRUE(write_settings(settings, settings_path()));
+    bool has_asked = false;
+    const Deadline deadline;
+    EXPECT_TRUE(run_viewer(given, [&] {
+      if (is_open("scene.json") && !std::exchange(has_asked, true)) press(SDLK_F12);
+      return std::filesystem::exists(path) || deadline.is_over();
+    }));
+    const auto image = read_png(path);
+    EXPECT_TRUE(image);
+    return image ? image->rgb : std::vector<std::uint8_t>();
+  };
+  const auto own = image_of(folder_.file("scene-1.png"), kBuiltinPack);
+  ASSERT_TRUE(choose_client(given, folder_.file("scene-2.png")));
+  const auto chosen = read_png(folder_.file("scene-2.png"));
+  ASSERT_TRUE(chosen);
+  EXPECT_EQ(read_settings(settings_path()).pack, jar.string());
+  EXPECT_NE(chosen->rgb, own);
+  EXPECT_EQ(chosen->rgb, image_of(folder_.file("scene-3.png"), jar.string())) << "as after opening it again";
 }
 
 // SDL detects double clicks, however long frames take.
