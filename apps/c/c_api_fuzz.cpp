@@ -248,6 +248,8 @@ class Program {
     given.look_count = byte() % 2;
     given.neighbours = byte() % 5;
     given.groups = byte();
+    given.fluid_groups = byte() % 3;
+    given.fluid_condition_count = byte() % 3;
     const quoin_scene scene = handle();
     const std::size_t type = index();
     took(quoin_type_set_shapes(scene, type, perhaps(&given)));

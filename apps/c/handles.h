@@ -183,6 +183,10 @@ template <>
 inline constexpr std::size_t kFirstSize<quoin_load_options> = offsetof(quoin_load_options, raw_shape);
 template <>
 inline constexpr std::size_t kFirstSize<quoin_render_options> = offsetof(quoin_render_options, has_sun);
+template <>
+inline constexpr std::size_t kFirstSize<quoin_shape_condition> = offsetof(quoin_shape_condition, position_count);
+template <>
+inline constexpr std::size_t kFirstSize<quoin_shapes> = offsetof(quoin_shapes, fluid_groups);
 
 template <class Struct>
 bool has_fit_size(const Struct* given) {

@@ -237,7 +237,7 @@ typedef struct quoin_shapes {
   size_t part_count;                       /* at most 64 */
   const quoin_shape_element* elements;     /* of all parts, one after another */
   size_t element_count;                    /* at most 512 */
-  const quoin_shape_condition* conditions; /* of all parts, one after another */
+  const quoin_shape_condition* conditions; /* of all parts, one after another, then those of the fluid */
   size_t condition_count;
   /* Looks that sides refer to by number. Without texels (rgba null, texels 0), a look has the colour of its tint. */
   const quoin_face* looks;
@@ -248,6 +248,11 @@ typedef struct quoin_shapes {
   uint32_t groups;
   int32_t ignores_full_sides; /* 1: does not connect to sides of other types that are covered wholly */
   int32_t reserved;           /* ignored */
+  /* A fluid in the rest of the voxel, such as the water around a fence. It is present if any of its conditions holds,
+   * and always if it has none; they may only use the state. */
+  uint32_t fluid_groups;        /* as `groups` of the fluid; 0: no fluid */
+  uint32_t reserved_too;        /* ignored */
+  size_t fluid_condition_count; /* how many of the last `conditions` are the fluid's */
 } quoin_shapes;
 
 enum { /* rules for the front of a placed voxel */

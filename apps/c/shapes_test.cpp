@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -276,6 +277,65 @@ TEST_F(CShapes, AreReadBackAndKeptInFiles) {
   EXPECT_LT(faces(3).max[0] - faces(3).min[0], 4.0F);
   ASSERT_EQ(quoin_type_set_shapes(scene_, 3, nullptr), QUOIN_OK);
   EXPECT_EQ(faces(3).count, 6U);
+}
+
+// A fence with water if bit 0 of the state is set, as in packs.
+TEST_F(CShapes, KeepContainedFluids) {
+  quoin_shapes given = shapes_of_stairs();
+  conditions_.resize(3, sized<quoin_shape_condition>());
+  conditions_[1].state_mask = conditions_[1].state = 1;
+  conditions_[2].state_mask = conditions_[2].state = 4;
+  given = list();
+  given.fluid_groups = 6;
+  given.fluid_condition_count = 2;
+  ASSERT_EQ(quoin_type_set_shapes(scene_, 2, &given), QUOIN_OK) << quoin_last_error();
+  quoin_textures textures = 0;
+  ASSERT_EQ(quoin_scene_textures(scene_, 0, &textures), QUOIN_OK);
+  auto whole = sized<quoin_shapes>();
+  ASSERT_EQ(quoin_textures_shapes(textures, 2, &whole), QUOIN_OK) << quoin_last_error();
+  EXPECT_EQ(whole.fluid_groups, 6U);
+  EXPECT_EQ(whole.fluid_condition_count, 2U);
+  ASSERT_EQ(whole.condition_count, 3U);
+  std::vector conditions(3, sized<quoin_shape_condition>());
+  ASSERT_EQ(quoin_textures_read_shapes(textures, 2, nullptr, nullptr, conditions.data(), nullptr), QUOIN_OK);
+  EXPECT_EQ(std::memcmp(conditions.data(), conditions_.data(), 3 * sizeof conditions[0]), 0);
+
+  given.fluid_condition_count = 4;
+  EXPECT_EQ(error(given), "the fluid has more conditions than the array");
+  given.fluid_condition_count = 1;
+  EXPECT_EQ(error(given), "the shapes have elements or conditions that no part counts");
+  given.fluid_condition_count = 2;
+  conditions_[2].connected = 1;
+  EXPECT_NE(error(given).find("fluid"), std::string::npos) << "a condition of neighbours";
+  conditions_[2].connected = 0;
+  given.fluid_groups = 0;
+  EXPECT_EQ(error(given), "the fluid has conditions, but no groups");
+  // A program compiled with an older header reads all conditions, and writes the shapes back without the fluid.
+  given.size = whole.size = offsetof(quoin_shapes, fluid_groups);
+  ASSERT_EQ(quoin_textures_shapes(textures, 2, &whole), QUOIN_OK) << quoin_last_error();
+  EXPECT_EQ(whole.condition_count, 3U);
+  EXPECT_EQ(quoin_type_set_shapes(scene_, 2, &given), QUOIN_OK) << quoin_last_error();
+  EXPECT_EQ(quoin_free(textures), QUOIN_OK);
+}
+
+// Structs of the header before shares of positions had 32 bytes.
+TEST_F(CShapes, TakeConditionsOfAnOlderHeader) {
+  constexpr std::size_t kOldSize = offsetof(quoin_shape_condition, position_count);
+  EXPECT_EQ(kOldSize, 32U);
+  quoin_shapes given = shapes_of_stairs();
+  conditions_[0].size = kOldSize;
+  ASSERT_EQ(quoin_type_set_shapes(scene_, 2, &given), QUOIN_OK) << quoin_last_error();
+  quoin_textures textures = 0;
+  ASSERT_EQ(quoin_scene_textures(scene_, 0, &textures), QUOIN_OK);
+  auto read = sized<quoin_shape_condition>();
+  read.size = kOldSize;
+  read.position_count = 99;
+  ASSERT_EQ(quoin_textures_read_shapes(textures, 2, nullptr, nullptr, &read, nullptr), QUOIN_OK) << quoin_last_error();
+  EXPECT_EQ(read.state_mask, 1U);
+  EXPECT_EQ(read.position_count, 99U) << "is not written";
+  EXPECT_EQ(quoin_free(textures), QUOIN_OK);
+  conditions_[0].size = kOldSize - 4;
+  EXPECT_EQ(error(given), "the condition 0 is null, or its size");
 }
 
 TEST_F(CShapes, AcceptFluidsWithoutParts) {

@@ -279,6 +279,8 @@ const char* validate_shapes(const quoin_shapes& given) {
   if ((given.parts == nullptr && given.part_count > 0) || (given.elements == nullptr && given.element_count > 0) ||
       (given.conditions == nullptr && given.condition_count > 0) || (given.looks == nullptr && given.look_count > 0))
     return "an array of the shapes is null, but has a count";
+  if (given.fluid_condition_count > given.condition_count) return "the fluid has more conditions than the array";
+  if (given.fluid_groups == 0 && given.fluid_condition_count > 0) return "the fluid has conditions, but no groups";
   if (given.neighbours < QUOIN_NEIGHBOURS_NONE || given.neighbours > QUOIN_NEIGHBOURS_FLUID)
     return "neighbours is not a QUOIN_NEIGHBOURS value";
   return nullptr;
@@ -316,7 +318,9 @@ Result<std::vector<ShapePart>> parts_of(const quoin_shapes& given, std::vector<S
         return {};
       });
   if (!visited) return visited.error();
-  if (element != elements.size() || condition != conditions.size())
+  // Structs of older headers have no fluids: programs that write back such shapes leave the fluid's conditions over.
+  const bool takes_all = condition == conditions.size() || given.size == kFirstSize<quoin_shapes>;
+  if (element != elements.size() || !takes_all)
     return make_error(ErrorCode::InvalidArgument, "the shapes have elements or conditions that no part counts");
   return parts;
 }
@@ -345,12 +349,19 @@ Result<VoxelShapes> shapes_of(const quoin_shapes* shapes) {
   }
   if (read) read = convert_all(given->conditions, given->condition_count, "condition", conditions, condition_of);
   if (!read) return read.error();
+  std::optional<ContainedFluid> fluid;
+  if (given->fluid_groups != 0) {
+    const auto first = conditions.end() - static_cast<std::ptrdiff_t>(given->fluid_condition_count);
+    fluid = ContainedFluid{.groups = given->fluid_groups, .when = {first, conditions.end()}};
+    conditions.erase(first, conditions.end());
+  }
   auto parts = parts_of(*given, std::move(elements), std::move(conditions));
   if (!parts) return parts.error();
   return VoxelShapes::from_rules({.parts = std::move(*parts),
                                   .neighbours = static_cast<ShapeNeighbours>(given->neighbours),
                                   .groups = given->groups,
-                                  .connects_to_full_sides = given->ignores_full_sides == 0});
+                                  .connects_to_full_sides = given->ignores_full_sides == 0,
+                                  .fluid = std::move(fluid)});
 }
 
 // The shapes of a type as the arrays of quoin_shapes.
@@ -366,6 +377,11 @@ struct ListedShapes {
     if (shapes.empty()) return;
     const ShapeRules& rules = shapes.rules();
     for (const ShapePart& part : rules.parts) add(part);
+    if (rules.fluid) {
+      for (const ShapeCondition& condition : rules.fluid->when) add(condition);
+      whole.fluid_groups = rules.fluid->groups;
+      whole.fluid_condition_count = rules.fluid->when.size();
+    }
     whole.part_count = parts.size();
     whole.element_count = elements.size();
     whole.condition_count = conditions.size();
@@ -383,18 +399,19 @@ struct ListedShapes {
     made.orientation = part.orientation.index();
     parts.push_back(made);
     for (const ShapeElement& element : part.shape.elements()) add(element);
-    for (const ShapeCondition& condition : part.when) {
-      quoin_shape_condition each{};
-      each.state_mask = condition.state_mask;
-      each.state = condition.state;
-      each.connected = condition.connected.bits();
-      each.unconnected = condition.unconnected.bits();
-      if (condition.corner) each.corner = QUOIN_CORNER_STRAIGHT + static_cast<std::int32_t>(*condition.corner);
-      each.position_count = condition.positions.count;
-      each.position_first = condition.positions.first;
-      each.position_end = condition.positions.end;
-      conditions.push_back(each);
-    }
+    for (const ShapeCondition& condition : part.when) add(condition);
+  }
+  void add(const ShapeCondition& condition) {
+    quoin_shape_condition made{};
+    made.state_mask = condition.state_mask;
+    made.state = condition.state;
+    made.connected = condition.connected.bits();
+    made.unconnected = condition.unconnected.bits();
+    if (condition.corner) made.corner = QUOIN_CORNER_STRAIGHT + static_cast<std::int32_t>(*condition.corner);
+    made.position_count = condition.positions.count;
+    made.position_first = condition.positions.first;
+    made.position_end = condition.positions.end;
+    conditions.push_back(made);
   }
   void add(const ShapeElement& element) {
     quoin_shape_element made{};

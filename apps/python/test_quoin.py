@@ -723,7 +723,10 @@ class Shapes(unittest.TestCase):
         arm = quoin.ShapePart((quoin.Element((10, 6, 7), (16, 9, 9)),), quoin.turn_orientation(axis=1, quarter_turns=3),
                               (quoin.Condition(connected=("+Z",), unconnected=("-X", "-Z")),
                                quoin.Condition(state_mask=0, corner="inner_right", positions=(12, 3, 7))))
-        return quoin.Shapes((quoin.ShapePart((post, leaf), 29), arm), "connected", 6, False)
+        return quoin.Shapes((quoin.ShapePart((post, leaf), 29), arm), "connected", 6, False, self.water())
+
+    def water(self):
+        return quoin.Fluid(6, (quoin.Condition(), quoin.Condition()))
 
     def test_are_read_back_and_kept_in_files(self):
         scene, fence = self.scene(), self.fence()
@@ -734,7 +737,7 @@ class Shapes(unittest.TestCase):
             again = quoin.load(path)
         for one in (scene, again):
             found = one.textures().shapes(3)
-            self.assertEqual(found[1:], ("connected", 6, False))
+            self.assertEqual(found[1:], ("connected", 6, False, self.water()))
             self.assertEqual(found.parts[1], fence.parts[1])
             self.assertEqual(found.parts[0].orientation, 29)
             for element, given in zip(found.parts[0].elements, fence.parts[0].elements):
@@ -751,6 +754,12 @@ class Shapes(unittest.TestCase):
         self.assertIsNone(scene.textures().shapes(3))
         scene.set_shapes(3, quoin.Shapes(neighbours="fluid"))
         self.assertEqual(scene.textures().shapes(3), quoin.Shapes(neighbours="fluid"))
+        # The water in a stair of the second type, by its state.
+        wet = quoin.Shapes((quoin.ShapePart((quoin.Element(max=(16, 8, 16)),)),),
+                           fluid=quoin.Fluid(1, (quoin.Condition(1, 1),)))
+        scene.set_shapes(2, wet)
+        scene.set_shapes(2, scene.textures().shapes(2))
+        self.assertEqual(scene.textures().shapes(2).fluid, wet.fluid)
 
     def test_of_meshes_follow_states(self):
         scene = self.scene()
@@ -826,6 +835,10 @@ class Shapes(unittest.TestCase):
             (lambda: scene.set_shapes(0, box), quoin.QuoinError),
             (lambda: scene.set_shapes(2, quoin.Shapes((part((box,), 0, (quoin.Condition(corner="x"),)),))), ValueError),
             (lambda: scene.set_shapes(3, quoin.Shapes((part((box,), 0, (quoin.Condition(1),)),))), quoin.QuoinError),
+            (lambda: scene.set_shapes(3, quoin.Shapes((part((box,)),), fluid=(1, ()))), TypeError),
+            (lambda: scene.set_shapes(3, quoin.Shapes((part((box,)),), fluid=quoin.Fluid(0))), ValueError),
+            (lambda: scene.set_shapes(3, quoin.Shapes((part((box,)),), fluid=quoin.Fluid(
+                1, (quoin.Condition(connected=("+X",)),)))), quoin.QuoinError),
             (lambda: scene.set_shapes(3, quoin.Shapes((part((box,), 0, (quoin.Condition(positions=(0, 1, 2)),)),))),
              ValueError),
             (lambda: scene.set_shapes(3, quoin.Shapes((part((box,), 0, (quoin.Condition(positions=(4, 2, 2)),)),))),

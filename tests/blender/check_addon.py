@@ -692,6 +692,8 @@ def check_shapes(quoin, folder):
     scene = quoin.from_numpy(np.array([1, 2, 0, 3], np.uint8).reshape(4, 1, 1), [stairs, log, (220, 40, 160, 90)])
     scene.set_shapes(1, [quoin.Element(max=(16, 8, 16), looks={"+Y": (10, 200, 30)}),
                          quoin.Element((8, 8, 0), (16, 16, 16), looks={"-X": quoin.Face(ring, "step", turn=1)})])
+    wet = scene.textures().shapes(1)._replace(fluid=quoin.Fluid(1, (quoin.Condition(4, 4),)))
+    scene.set_shapes(1, wet)
     scene.set_type(1, stairs)  # after the shapes, which else decide the light
     scene.set_orientations(1, "about_y_and_upside_down")
     scene.set_faces(2, [quoin.Face(bark, "bark"), quoin.Face(ring, "ring"), quoin.Face(ring, "ring")])
@@ -748,6 +750,8 @@ def check_shapes(quoin, folder):
             require((a is None) == (b is None), "shapes")
             bare = lambda shapes: [[each._replace(looks={}) for each in part.elements] for part in shapes.parts]
             require(a is None or bare(a) == bare(b), "elements")
+            require(a is None or a.fluid == b.fluid, "contained fluid")
+        require(read.textures().shapes(1).fluid == wet.fluid, "the stairs' water")
         step = read.textures().shapes(1).parts[0].elements[1].looks["-X"]
         require((step.name, step.turn) == ("step", 1) and (step.image[..., :3] == ring).all(), "the step's look")
         require(read.textures().shapes(1).parts[0].elements[0].looks["+Y"] == (10, 200, 30), "the slab's colour")

@@ -79,7 +79,7 @@ def _pack_element(one, images):
 def _pack_shapes(shapes, images):
     parts = [{"elements": [_pack_element(each, images) for each in one.elements], "orientation": one.orientation,
               "when": one.when} for one in shapes.parts]
-    return {**shapes._asdict(), "parts": parts}
+    return {**shapes._asdict(), "parts": parts}  # `fluid` becomes a list
 
 
 def _pack_forms(forms):
@@ -123,7 +123,10 @@ def _unpack_shapes(shapes, images):
     parts = tuple(quoin.ShapePart(tuple(_unpack_element(each, images) for each in one["elements"]), one["orientation"],
                                   tuple(quoin.Condition(*_tuples(each)) for each in one["when"]))
                   for one in shapes["parts"])
-    return quoin.Shapes(**{**shapes, "parts": parts})
+    fluid = shapes.get("fluid")  # absent in older files
+    if fluid is not None:
+        fluid = quoin.Fluid(fluid[0], tuple(quoin.Condition(*_tuples(each)) for each in fluid[1]))
+    return quoin.Shapes(**{**shapes, "parts": parts, "fluid": fluid})
 
 
 def _unpack_forms(found, sizes, packed):

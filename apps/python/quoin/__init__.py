@@ -36,12 +36,12 @@ from ._c import NdArray, QuoinError, Status
 from ._mesh import Mesh, mesh_labels, surface_nets
 from ._scene import (Body, Camera, Environment, Fog, Format, Grid, Ground, Group, Heights, Hits, Instance, Lamp, Layer,
                      Raw, Scene, Sun, VoxelType, formats, from_numpy, load, load_bytes)
-from ._textures import (Condition, Element, Face, Orientations, ShapePart, Shapes, Textures, Turn, orientation_matrix,
-                        turn_orientation)
+from ._textures import (Condition, Element, Face, Fluid, Orientations, ShapePart, Shapes, Textures, Turn,
+                        orientation_matrix, turn_orientation)
 
-__all__ = ["Body", "Camera", "Condition", "Element", "Environment", "Face", "Fog", "Format", "Grid", "Ground", "Group",
-           "Heights", "Hits", "Instance", "Lamp", "Layer", "Mesh", "Orientations", "QuoinError", "Raw", "Scene",
-           "ShapePart", "Shapes", "Status", "Sun", "Textures", "Turn", "VoxelType", "__version__", "formats",
+__all__ = ["Body", "Camera", "Condition", "Element", "Environment", "Face", "Fluid", "Fog", "Format", "Grid", "Ground",
+           "Group", "Heights", "Hits", "Instance", "Lamp", "Layer", "Mesh", "Orientations", "QuoinError", "Raw",
+           "Scene", "ShapePart", "Shapes", "Status", "Sun", "Textures", "Turn", "VoxelType", "__version__", "formats",
            "from_numpy", "load", "load_bytes", "mesh_labels", "orientation_matrix", "png", "progress", "surface_nets",
            "turn_orientation", "version"]
 

@@ -119,7 +119,8 @@ class Shapes(ctypes.Structure):
                 ("elements", ctypes.c_void_p), ("element_count", ctypes.c_size_t), ("conditions", ctypes.c_void_p),
                 ("condition_count", ctypes.c_size_t), ("looks", ctypes.c_void_p), ("look_count", ctypes.c_size_t),
                 ("neighbours", ctypes.c_int32), ("groups", ctypes.c_uint32), ("ignores_full_sides", ctypes.c_int32),
-                ("reserved", ctypes.c_int32)]
+                ("reserved", ctypes.c_int32), ("fluid_groups", ctypes.c_uint32), ("reserved_too", ctypes.c_uint32),
+                ("fluid_condition_count", ctypes.c_size_t)]
 
 
 class Placing(ctypes.Structure):

@@ -84,6 +84,14 @@ class ShapePart(NamedTuple):
     when: Tuple[Condition, ...] = ()
 
 
+class Fluid(NamedTuple):
+    """A fluid in the rest of a voxel that has a shape: the water around a fence. It is present if any of its conditions
+    holds, and always if it has none; they may only use the state."""
+
+    groups: int = 1  #: as `Shapes.groups` of the fluid, not 0
+    when: Tuple[Condition, ...] = ()
+
+
 class Shapes(NamedTuple):
     """The shapes of a type, which a voxel's state and neighbours select."""
 
@@ -93,6 +101,7 @@ class Shapes(NamedTuple):
     neighbours: str = "none"
     groups: int = 1  #: a bit per group: types with a common bit connect
     connects_to_full_sides: bool = True  #: also to sides of other types that are covered wholly
+    fluid: Optional[Fluid] = None  #: in the rest of the voxel
 
 
 class Orientations(NamedTuple):
@@ -202,9 +211,10 @@ class Textures:
                                                    conditions or None, looks or None))
         seen: List[Look] = [_face_of(one, self._owner) if one.rgba else tuple(one.tint)[:3] for one in looks]
         boxes, rules = iter([_element_of(one, seen) for one in elements]), iter(map(_condition_of, conditions))
-        return Shapes(tuple(ShapePart(tuple(next(boxes) for _ in range(one.element_count)), one.orientation,
-                                      tuple(next(rules) for _ in range(one.condition_count))) for one in parts),
-                      _NEIGHBOURS[whole.neighbours], whole.groups, not whole.ignores_full_sides)
+        made = tuple(ShapePart(tuple(next(boxes) for _ in range(one.element_count)), one.orientation,
+                               tuple(next(rules) for _ in range(one.condition_count))) for one in parts)
+        return Shapes(made, _NEIGHBOURS[whole.neighbours], whole.groups, not whole.ignores_full_sides,
+                      Fluid(whole.fluid_groups, tuple(rules)) if whole.fluid_groups else None)
 
 
 def _room(structure: Any, count: int) -> Any:
@@ -357,6 +367,11 @@ def shapes_struct(shapes: Any) -> Any:
         raise TypeError("parts must be quoin.ShapePart objects")
     elements = [one for part in shapes.parts for one in part.elements]
     conditions = [one for part in shapes.parts for one in part.when]
+    fluid = shapes.fluid
+    if fluid is not None:
+        if not isinstance(fluid, Fluid):
+            raise TypeError("the fluid must be a quoin.Fluid")
+        conditions.extend(fluid.when)
     parts, boxes, rules = (_room(*one) for one in ((_c.ShapePart, len(shapes.parts)),
                                                     (_c.ShapeElement, len(elements)),
                                                     (_c.ShapeCondition, len(conditions))))
@@ -377,6 +392,9 @@ def shapes_struct(shapes: Any) -> Any:
     given.neighbours = _number_of(shapes.neighbours, _NEIGHBOURS, "neighbours")
     given.groups = _c.whole(shapes.groups, "groups", 0, 2**32 - 1)
     given.ignores_full_sides = int(not shapes.connects_to_full_sides)
+    if fluid is not None:
+        given.fluid_groups = _c.whole(fluid.groups, "groups of the fluid", 1, 2**32 - 1)
+        given.fluid_condition_count = len(fluid.when)
     given.kept = (parts, boxes, rules, faces, looks.kept)  # keeps them alive during the call
     return given
 
