@@ -202,7 +202,12 @@ constexpr std::array kBedrockStates = std::to_array<BedrockStateRule>({
     {"*", "pillar_axis", "*=axis"},
     {"*", "cardinal_direction", "*=facing"},
     {"*", "block_face", "*=facing"},
+    // Sideways, these point away from their direction.
+    {"piston sticky_piston end_rod", "facing_direction",
+     "0=facing:down 1=facing:up 2=facing:south 3=facing:north 4=facing:east 5=facing:west"},
     {"*", "facing_direction", kSixFacings},
+    {"*", "facing_direction",
+     "down=facing:down up=facing:up north=facing:north south=facing:south west=facing:west east=facing:east"},
     {"*_bed", "head_piece_bit", "0=part:foot 1=part:head"},
     {"*_bed", "occupied_bit", "0=occupied:false 1=occupied:true"},
     {"lever", "lever_direction",

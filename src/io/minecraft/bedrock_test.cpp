@@ -109,6 +109,21 @@ TEST(BedrockStructure, ReadsBlocksAtTheirPositions) {
   for (const std::string& line : loaded->warnings) warnings += line + "\n";
   EXPECT_NE(warnings.find("1 block entities"), std::string::npos);
   EXPECT_NE(warnings.find("1 entities"), std::string::npos);
+  EXPECT_EQ(warnings.find("same voxels"), std::string::npos) << warnings;
+}
+
+// A voxel holds one block; a second one that is not water is only counted.
+TEST(BedrockStructure, CountsSecondBlocksOfAVoxel) {
+  StructureText text;
+  text.water = {4, 4, 4, -1, 4, 4, -1, -1, -1, -1, 5, -1};
+  const auto loaded = load_scene(structure_of(text));
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  EXPECT_EQ(bedrock_block_at(*loaded, {0, 0, 0}), "minecraft:granite[waterlogged=false]");
+  EXPECT_EQ(bedrock_block_at(*loaded, {0, 1, 2}), "mod:strange[mood=odd,size=3]") << "the only block there";
+  std::string warnings;
+  for (const std::string& line : loaded->warnings) warnings += line + "\n";
+  EXPECT_NE(warnings.find("left out: 4 blocks in the same voxels as others (snow around flowers)"), std::string::npos)
+      << warnings;
 }
 
 TEST(BedrockStructure, RefusesDamagedContent) {
@@ -160,6 +175,11 @@ TEST(BedrockBlocks, BecomeBlocksOfTheJavaEdition) {
       {java("minecraft:fence_gate", {{"minecraft:cardinal_direction", "west"}, {"in_wall_bit", "0"}}),
        "minecraft:oak_fence_gate[facing=west,in_wall=false]"},
       {java("minecraft:ladder", {{"facing_direction", "5"}}), "minecraft:ladder[facing=east]"},
+      {java("minecraft:piston", {{"facing_direction", "2"}}), "minecraft:piston[facing=south]"},
+      {java("minecraft:sticky_piston", {{"facing_direction", "5"}}), "minecraft:sticky_piston[facing=west]"},
+      {java("minecraft:end_rod", {{"facing_direction", "1"}}), "minecraft:end_rod[facing=up]"},
+      {java("minecraft:dispenser", {{"facing_direction", "2"}}), "minecraft:dispenser[facing=north]"},
+      {java("minecraft:observer", {{"minecraft:facing_direction", "up"}}), "minecraft:observer[facing=up]"},
       {java("minecraft:torch", {{"torch_facing_direction", "top"}}), "minecraft:torch"},
       {java("minecraft:unlit_redstone_torch", {{"torch_facing_direction", "north"}}),
        "minecraft:redstone_wall_torch[facing=south,lit=false]"},

@@ -188,6 +188,7 @@ class SchematicReader {
   ColumnBuilder builder_{types_};
   std::size_t entities_ = 0;
   std::size_t block_entities_ = 0;
+  std::size_t second_blocks_ = 0;
   std::map<std::string, std::uint64_t> invisible_;
   bool has_lost_biomes_ = false;
 };
@@ -496,7 +497,7 @@ Status SchematicReader::read_structure() {
   return put_structure(region, root_["blocks"]);
 }
 
-/// Returns the index of water in a Bedrock palette's blocks.
+/// Returns true for a block of water in a Bedrock palette.
 bool is_bedrock_water(nbt::Value block) {
   const std::string_view name = block["name"].text().value_or("");
   return name == "minecraft:water" || name == "minecraft:flowing_water";
@@ -515,30 +516,41 @@ Result<Block> SchematicReader::bedrock_block(nbt::Value entry, std::optional<boo
   return types_.block(block.name, block.properties);
 }
 
-/// The block indices of a Bedrock structure, ordered by x, then y, then z. A second list has the water in blocks.
+/// The content of a voxel of a Bedrock structure.
+struct BedrockVoxel {
+  std::uint16_t block;  ///< index in the palette; BedrockIndices::kNone: no block
+  bool has_water;       ///< in its rest
+  bool loses_second;    ///< a second block, that is not water, is left out
+};
+
+/// The block indices of a Bedrock structure, ordered by x, then y, then z. A second list has the water in blocks, and
+/// snow around plants.
 struct BedrockIndices {
   nbt::Value blocks;
-  nbt::Value water;  ///< may be none
+  nbt::Value seconds;  ///< may be none
   IVec3 size{0};
   std::vector<bool> is_water;         ///< by palette index
+  std::vector<bool> is_air;           ///< by palette index
   std::vector<std::uint16_t> filled;  ///< by palette index: that of the block with water, or 0
   static constexpr std::uint16_t kNone = 0xFFFF;
 
-  /// Returns the block at (x, y, z) and whether water fills its rest; kNone for no block. Errors: BadFormat.
-  [[nodiscard]] Result<std::pair<std::uint16_t, bool>> at(IVec3 voxel) const {
+  /// Returns the content of the voxel (x, y, z). Errors: BadFormat.
+  [[nodiscard]] Result<BedrockVoxel> at(IVec3 voxel) const {
     const std::size_t at =
         (static_cast<std::size_t>(voxel.x) * static_cast<std::size_t>(size.y) + static_cast<std::size_t>(voxel.y)) *
             static_cast<std::size_t>(size.z) +
         static_cast<std::size_t>(voxel.z);
     const std::int64_t block = blocks.integer(at);
-    const std::int64_t second = water ? water.integer(at) : -1;
+    const std::int64_t second = seconds ? seconds.integer(at) : -1;
     const auto kinds = static_cast<std::int64_t>(is_water.size());
     if (std::min(block, second) < -1 || std::max(block, second) >= kinds) {
       return fault("a block index is beyond the " + std::to_string(kinds) + " blocks of the palette", blocks);
     }
-    const bool has_water = second >= 0 && is_water[static_cast<std::size_t>(second)];
-    if (block < 0) return std::pair(has_water ? static_cast<std::uint16_t>(second) : kNone, false);
-    return std::pair(static_cast<std::uint16_t>(block), has_water && !is_water[static_cast<std::size_t>(block)]);
+    if (second < 0) return BedrockVoxel{block < 0 ? kNone : static_cast<std::uint16_t>(block), false, false};
+    if (block < 0) return BedrockVoxel{static_cast<std::uint16_t>(second), false, false};
+    const bool has_water = is_water[static_cast<std::size_t>(second)];
+    return BedrockVoxel{static_cast<std::uint16_t>(block), has_water && !is_water[static_cast<std::size_t>(block)],
+                        !has_water && !is_air[static_cast<std::size_t>(second)]};
   }
 };
 
@@ -556,12 +568,13 @@ Status SchematicReader::read_bedrock() {
         "the structure of " + text_of(*size) + " blocks has " + std::to_string(layers[0].count()) + " block indices",
         structure);
   }
-  BedrockIndices indices{layers[0], is_whole(layers[1]) ? layers[1] : nbt::Value(), *size, {}, {}};
+  BedrockIndices indices{layers[0], is_whole(layers[1]) ? layers[1] : nbt::Value(), *size, {}, {}, {}};
   const nbt::Value contents = structure["palette"]["default"];
   std::vector<nbt::Value> entries;
   contents["block_palette"].for_each([&](nbt::Value entry) {
     entries.push_back(entry);
     indices.is_water.push_back(is_bedrock_water(entry));
+    indices.is_air.push_back(entry["name"].text() == "minecraft:air");
   });
   constexpr std::size_t kMaxKinds = kMaxPalette / 2;
   if (entries.size() > kMaxKinds) return fault("the palette has more than 32,767 blocks", contents);
@@ -571,7 +584,8 @@ Status SchematicReader::read_bedrock() {
       for (int z = 0; z < size->z; ++z) {
         const auto block = indices.at({x, y, z});
         if (!block) return block.error();
-        if (block->second) indices.filled[block->first] = 1;
+        if (block->has_water) indices.filled[block->block] = 1;
+        second_blocks_ += block->loses_second ? 1 : 0;
       }
     }
   }
@@ -598,8 +612,8 @@ Status SchematicReader::read_bedrock() {
       const auto width = static_cast<std::size_t>(indices.size.x);
       const auto block = indices.at({static_cast<int>(i % width), y, static_cast<int>(i / width)});
       if (!block) return block.error();
-      const auto [index, is_filled] = *block;
-      layer[i] = index == BedrockIndices::kNone ? air : is_filled ? indices.filled[index] : index;
+      const std::uint16_t index = block->block;
+      layer[i] = index == BedrockIndices::kNone ? air : block->has_water ? indices.filled[index] : index;
     }
     return {};
   };
@@ -768,6 +782,7 @@ void SchematicReader::note_left_out() {
   };
   note(block_entities_, "block entities (chests, signs and others)");
   note(entities_, "entities");
+  note(second_blocks_, "blocks in the same voxels as others (snow around flowers)");
   if (!invisible_.empty()) loaded_.warnings.push_back(text_of_skipped_blocks(invisible_));
   if (has_lost_biomes_) {
     loaded_.warnings.emplace_back("left out: damaged biomes; plains colours are used there");
