@@ -48,6 +48,7 @@ class Turner {
 
   /// Returns false if there is no such state.
   bool run() {
+    if (name_.ends_with("torch") && !is_upright()) return false;
     if (find("face") != nullptr && find("facing") != nullptr) return turn_mounted();
     if (!turn_sides()) return false;
     return std::ranges::all_of(properties_, [&](Property& property) { return turn_property(property); });
@@ -119,7 +120,8 @@ class Turner {
     const auto facing = direction_of(value);
     if (!facing) return true;
     const Direction to = turn_.apply(*facing);
-    if (is_vertical(to) && !faces_up()) return false;
+    const bool stays = is_upright() && to == *facing;  // a hopper that faces down
+    if (is_vertical(to) && !faces_up() && !stays) return false;
     value = word_of(to);
     // Blocks that stand on something keep standing; a facing alone does not tell.
     const bool lies_free = faces_up() || find("half") != nullptr;

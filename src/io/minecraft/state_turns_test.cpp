@@ -43,6 +43,17 @@ TEST(StateTurns, MoveDirectionsOfProperties) {
       {turned_text("furnace[facing=east]", over), "none"},
       {turned_text("observer[facing=east]", over), "observer[facing=east]"},
       {turned_text("observer[facing=up]", side), "observer[facing=south]"},
+      {turned_text("hopper[enabled=true,facing=down]", left), "hopper[enabled=true,facing=down]"},
+      {turned_text("hopper[enabled=true,facing=down]", mirror), "hopper[enabled=true,facing=down]"},
+      {turned_text("hopper[enabled=true,facing=down]", over), "none"},
+      {turned_text("hopper[enabled=true,facing=north]", side), "none"},
+      {turned_text("torch", over), "none"},
+      {turned_text("redstone_torch[lit=true]", over), "none"},
+      {turned_text("redstone_torch[lit=true]", left), "redstone_torch[lit=true]"},
+      {turned_text("wall_torch[facing=east]", over), "none"},
+      {turned_text("oak_trapdoor[facing=north,half=bottom,open=true]", side), "none"},
+      {turned_text("oak_trapdoor[facing=north,half=bottom,open=true]", over),
+       "oak_trapdoor[facing=south,half=top,open=true]"},
       {turned_text("oak_log[axis=y]", side), "oak_log[axis=z]"},
       {turned_text("oak_log[axis=x]", left), "oak_log[axis=z]"},
       {turned_text("oak_stairs[facing=east,half=bottom,shape=outer_left]", over),
@@ -257,7 +268,7 @@ TEST(StateTurns, CopiesHaveTheTurnedShapesOfBlocks) {
 }
 
 TEST(StateTurns, WithoutThemCopiesDiffer) {
-  // Copies by orientations alone keep the states of fences and doors.
+  // As above, but copies by orientations alone keep the states of fences and doors.
   const Garden garden = garden_of_blocks();
   const AxisOrientation turn = AxisOrientation::quarter_turns(1, 1);
   const CopyOptions options{.types = &garden.scene.types};
