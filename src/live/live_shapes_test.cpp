@@ -475,6 +475,33 @@ TEST(LiveShapes, FollowStatesTwoVoxelsAway) {
   }
 }
 
+// No voxel is of the fluid that the slab contains.
+TEST(LiveShapes, ContainedFluidsFollowTheirTypes) {
+  Scene scene;
+  const VoxelProperties of_sea{.name = "sea",
+                               .visibility = Visibility::Transparent,
+                               .shapes = *VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid, .groups = 2})};
+  ShapeRules rules{.parts = {{.shape = VoxelShape::box({0, 0, 0}, {16, 8, 16})}}};
+  rules.fluid = ContainedFluid{.groups = 2};
+  const VoxelType slab = *scene.types.add({.name = "slab", .shapes = *VoxelShapes::from_rules(std::move(rules))});
+  SceneGrid entry;
+  entry.grid.set({5, 5, 5}, slab);
+  const GridHandle handle = scene.add_grid(std::move(entry));
+  scene.add_instance({"", handle});
+  LiveMeshes meshes;
+  ShownSurfaces shown;
+  const auto shown_faces = [&] {
+    meshes.finish(scene, {});
+    shown.apply(meshes.take());
+    return shown.find(handle, {0, 0, 0})->shapes.size();
+  };
+  EXPECT_EQ(shown_faces(), 6U);
+  const VoxelType sea = *scene.types.add(of_sea);
+  EXPECT_GT(shown_faces(), 6U);
+  scene.types.replace(sea, {.name = "ice"});
+  EXPECT_EQ(shown_faces(), 6U);
+}
+
 TEST(LiveShapes, AreCubesOnRequest) {
   ShapedWorld world(7);
   LiveMeshOptions options;
