@@ -301,8 +301,8 @@ class HomeFolder {
   std::string before_;
 };
 
-/// Opens a file and chooses the only client in the menu Blocks. If `image` is not empty, then saves an image, which must
-/// get that name.
+/// Opens a file and chooses the only client in the menu Blocks. If `image` is not empty, then saves an image, which
+/// must get that name.
 Status choose_client(const ViewerOptions& given, const std::filesystem::path& image = {}) {
   using std::chrono::milliseconds;
   // The menu and its item with the usual font, and with others.
