@@ -1090,7 +1090,9 @@ def load_bytes(data: Union[bytes, bytearray, memoryview], *, frame: int = 0, sho
     held = _add_packs(options, packs, True)
     array = _bytes_of(data)
     out = ctypes.c_uint64()
-    _c.check(_c.lib.quoin_scene_load_bytes_with(array.ctypes.data, array.size, ctypes.byref(options), ctypes.byref(out)))
+    _c.check(
+        _c.lib.quoin_scene_load_bytes_with(array.ctypes.data, array.size, ctypes.byref(options), ctypes.byref(out))
+    )
     del held
     return Scene(_c.Owner(out.value))
 

@@ -88,7 +88,7 @@ class Fluid(NamedTuple):
     """A fluid in the rest of a voxel that has a shape: the water around a fence. It is present if any of its conditions
     holds, and always if it has none; they may only use the state."""
 
-    groups: int = 1  #: as `Shapes.groups` of the fluid, not 0
+    groups: int = 1  #: as `Shapes.groups` of the fluid: exactly one bit
     when: Tuple[Condition, ...] = ()
 
 
