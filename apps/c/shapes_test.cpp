@@ -286,14 +286,14 @@ TEST_F(CShapes, KeepContainedFluids) {
   conditions_[1].state_mask = conditions_[1].state = 1;
   conditions_[2].state_mask = conditions_[2].state = 4;
   given = list();
-  given.fluid_groups = 6;
+  given.fluid_groups = 4;
   given.fluid_condition_count = 2;
   ASSERT_EQ(quoin_type_set_shapes(scene_, 2, &given), QUOIN_OK) << quoin_last_error();
   quoin_textures textures = 0;
   ASSERT_EQ(quoin_scene_textures(scene_, 0, &textures), QUOIN_OK);
   auto whole = sized<quoin_shapes>();
   ASSERT_EQ(quoin_textures_shapes(textures, 2, &whole), QUOIN_OK) << quoin_last_error();
-  EXPECT_EQ(whole.fluid_groups, 6U);
+  EXPECT_EQ(whole.fluid_groups, 4U);
   EXPECT_EQ(whole.fluid_condition_count, 2U);
   ASSERT_EQ(whole.condition_count, 3U);
   std::vector conditions(3, sized<quoin_shape_condition>());

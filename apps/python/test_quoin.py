@@ -726,7 +726,7 @@ class Shapes(unittest.TestCase):
         return quoin.Shapes((quoin.ShapePart((post, leaf), 29), arm), "connected", 6, False, self.water())
 
     def water(self):
-        return quoin.Fluid(6, (quoin.Condition(), quoin.Condition()))
+        return quoin.Fluid(4, (quoin.Condition(), quoin.Condition()))
 
     def test_are_read_back_and_kept_in_files(self):
         scene, fence = self.scene(), self.fence()

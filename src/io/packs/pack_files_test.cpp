@@ -184,7 +184,7 @@ TEST(PackFiles, HashCountsTheFilesThatAreUsed) {
   write_text(folder / "game/mods/textures/stone.png", "tile");
   EXPECT_TRUE(counts("game", "game/mods/my mod/textures/x.png")) << "names with blanks are tiles";
   EXPECT_FALSE(counts("game", "game/mods/textures/x.txt"));
-  EXPECT_FALSE(counts("game", "game/mods/pictures/x.png")) << "no tile";
+  EXPECT_FALSE(counts("game", "game/mods/drawings/x.png")) << "no tile";
   fs::create_directories(folder / "outside");
   fs::create_directories(folder / "pack/real");
   std::error_code error;
