@@ -1,3 +1,4 @@
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -11,43 +12,12 @@
 
 #include "io/minecraft/bedrock_blocks.h"
 #include "io/minecraft/block_types.h"
+#include "io/minecraft/minecraft_for_tests.h"
 
 namespace quoin::minecraft {
 namespace {
 
-/// Writes NBT of the Bedrock edition, least significant byte first.
-class LittleNbt {
- public:
-  std::vector<std::byte> bytes;
-
-  LittleNbt& number(std::uint64_t value, int size) {
-    for (int i = 0; i < size; ++i) bytes.push_back(static_cast<std::byte>(value >> (8 * i)));
-    return *this;
-  }
-  LittleNbt& tag(int kind, std::string_view name) { return number(static_cast<std::uint64_t>(kind), 1).text(name); }
-  LittleNbt& text(std::string_view value) {
-    number(value.size(), 2);
-    for (const char c : value) bytes.push_back(static_cast<std::byte>(c));
-    return *this;
-  }
-  LittleNbt& compound(std::string_view name) { return tag(10, name); }
-  LittleNbt& end() { return number(0, 1); }
-  LittleNbt& byte(std::string_view name, int value) {
-    return tag(1, name).number(static_cast<std::uint64_t>(value), 1);
-  }
-  LittleNbt& integer(std::string_view name, int value) {
-    return tag(3, name).number(static_cast<std::uint64_t>(value), 4);
-  }
-  LittleNbt& string(std::string_view name, std::string_view value) { return tag(8, name).text(value); }
-  LittleNbt& list(std::string_view name, int kind, std::size_t count) {
-    return tag(9, name).number(static_cast<std::uint64_t>(kind), 1).number(count, 4);
-  }
-  LittleNbt& integers(const std::vector<int>& values) {  // a list in a list
-    number(3, 1).number(values.size(), 4);
-    for (const int value : values) number(static_cast<std::uint64_t>(value), 4);
-    return *this;
-  }
-};
+using minecraft_test::NbtWriter;
 
 struct StructureText {
   std::vector<int> size{2, 2, 3};
@@ -57,13 +27,13 @@ struct StructureText {
 
 /// Writes a structure of stone, stairs, a slab, a torch, an unknown block and water.
 std::vector<std::byte> structure_of(const StructureText& text = {}) {
-  LittleNbt nbt;
+  NbtWriter nbt(std::endian::little);
   nbt.compound("").integer("format_version", 1).list("size", 3, text.size.size());
   for (const int edge : text.size) nbt.number(static_cast<std::uint64_t>(edge), 4);
   nbt.compound("structure").list("block_indices", 9, 2).integers(text.blocks).integers(text.water);
   nbt.list("entities", 10, 1).string("identifier", "minecraft:pig").end();
   nbt.compound("palette").compound("default").list("block_palette", 10, 6);
-  const auto block = [&](const char* name) -> LittleNbt& {
+  const auto block = [&](const char* name) -> NbtWriter& {
     return nbt.string("name", name).integer("version", 18'000'000).compound("states");
   };
   block("minecraft:stone").string("stone_type", "granite").end().end();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -10,13 +11,18 @@
 
 namespace quoin::minecraft_test {
 
-/// Writes NBT, most significant byte first.
+/// Writes NBT. `order`: little in the Bedrock edition.
 class NbtWriter {
  public:
+  explicit NbtWriter(std::endian order = std::endian::big) : order_(order) {}
+
   std::vector<std::byte> bytes;
 
   NbtWriter& number(std::uint64_t value, int size) {
-    for (int i = size - 1; i >= 0; --i) bytes.push_back(static_cast<std::byte>(value >> (8 * i)));
+    for (int i = 0; i < size; ++i) {
+      const int place = order_ == std::endian::little ? i : size - 1 - i;
+      bytes.push_back(static_cast<std::byte>(value >> (8 * place)));
+    }
     return *this;
   }
   NbtWriter& text(std::string_view value) {
@@ -37,6 +43,11 @@ class NbtWriter {
   NbtWriter& list(std::string_view name, int kind, std::size_t count) {
     return tag(9, name).number(static_cast<std::uint64_t>(kind), 1).number(count, 4);
   }
+  NbtWriter& integers(const std::vector<int>& values) {  // a list in a list
+    number(3, 1).number(values.size(), 4);
+    for (const int value : values) number(static_cast<std::uint64_t>(value), 4);
+    return *this;
+  }
   NbtWriter& longs(std::string_view name, const std::vector<std::uint64_t>& values) {
     tag(12, name).number(values.size(), 4);
     for (const std::uint64_t value : values) number(value, 8);
@@ -47,6 +58,9 @@ class NbtWriter {
     for (const std::uint8_t value : values) number(value, 1);
     return *this;
   }
+
+ private:
+  std::endian order_;
 };
 
 /// Creates a region file with one chunk of these bytes at (x, z), by default uncompressed (compression 3).
