@@ -18,6 +18,7 @@
 
 #include "core/caches.h"
 #include "core/work/progress_steps.h"
+#include "io/column_scan.h"
 #include "io/luanti/luanti.h"
 #include "io/minecraft/block_types.h"
 
@@ -131,6 +132,22 @@ Result<std::optional<Chunk>> ChunkSource::read(IVec3 chunk, std::vector<Error>* 
   std::optional<Chunk> found = chunk_in(entry.chunks);
   cache_->keep_within_limit();
   return found;
+}
+
+Result<VisitedColumns> ChunkSource::visit_columns(std::size_t part, int top,
+                                                  FunctionRef<bool(IVec3 voxel, VoxelType type)> visit) const {
+  auto content = read_part(part);
+  if (!content) return content.error();
+  ColumnScan scan(top);
+  for (auto each = content->chunks.rbegin(); each != content->chunks.rend(); ++each) {
+    scan.visit(each->chunk, each->voxels, visit);
+  }
+  return VisitedColumns{.broken = std::move(content->broken), .chunks = content->chunks.size()};
+}
+
+Result<std::uint64_t> ChunkSource::part_stamp(std::size_t part) const {
+  QUOIN_ASSERT(part < parts().size(), "a part of the source");
+  return std::uint64_t{0};
 }
 
 namespace {

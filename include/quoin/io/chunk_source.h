@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include <quoin/core/function_ref.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
@@ -50,6 +51,19 @@ struct SourcePart {
   std::vector<Error> broken{};      ///< unreadable items that were skipped, with file and byte offset
   std::map<std::string, std::uint64_t> skipped_blocks{};  ///< number of voxels read as air, by block name
   std::vector<Lamp> lamps{};                              ///< lights without geometry, in voxels of the source's grid
+};
+
+/// A sign of a block world.
+struct SourceSign {
+  IVec3 voxel{0};
+  std::string text;  ///< lines without formatting, separated by line feeds; without empty lines at the end
+};
+
+/// The result of ChunkSource::visit_columns.
+struct VisitedColumns {
+  std::vector<Error> broken{};      ///< as SourcePart::broken
+  std::vector<SourceSign> signs{};  ///< in any order
+  std::uint64_t chunks = 0;         ///< chunks of the format that were read: 16 x 16 blocks in Minecraft
 };
 
 /// A world that is read chunk by chunk and never held whole: a folder of region files, a database, a large model.
@@ -94,6 +108,19 @@ class ChunkSource {
   /// part read the part once.
   /// Errors: as read_part.
   [[nodiscard]] Result<std::optional<Chunk>> read(IVec3 chunk, std::vector<Error>* broken = nullptr) const;
+
+  /// Calls `visit` for the voxels of a part up to the height `top`, except air, in each column from the top down, until
+  /// it returns false for a voxel of that column. Different columns can take turns. Maps take much less time in this way
+  /// than by `read_part`: if the format allows it, the voxels below are not even decoded.
+  ///
+  /// `visit`: receives the voxel in the source's grid and its type, of `types()`.
+  /// Errors:  as read_part. Requires: part < parts().size().
+  [[nodiscard]] virtual Result<VisitedColumns> visit_columns(
+      std::size_t part, int top, FunctionRef<bool(IVec3 voxel, VoxelType type)> visit) const;
+  /// Returns a number that differs after a program has saved content of the part; 0 if that is unknown, also if it may
+  /// have been saved at this very moment. Reads the files' times where the format has them, not the content.
+  /// Errors: CannotRead. Requires: part < parts().size().
+  [[nodiscard]] virtual Result<std::uint64_t> part_stamp(std::size_t part) const;
 
  protected:
   /// Requires: parts are one chunk along x and z, and do not overlap.

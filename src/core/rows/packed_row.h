@@ -5,12 +5,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <span>
 
 #ifdef __SSE2__
 #include <emmintrin.h>
 #endif
 
 #include <quoin/core/assert.h>
+
+#include "core/bytes/bytes.h"
 
 namespace quoin::packed_row {
 
@@ -310,6 +313,15 @@ inline std::uint64_t mixed_with(std::uint64_t hash, std::uint64_t value) {
 }
 
 inline constexpr std::uint64_t kHashSeed = 0x2D35'8DCC'AA6C'78A5U;
+
+/// Hashes bytes, after those in `hash`.
+inline std::uint64_t hash_of_bytes(std::uint64_t hash, std::span<const std::byte> bytes) {
+  for (; bytes.size() >= 8; bytes = bytes.subspan(8)) {
+    hash = mixed_with(hash, load<std::uint64_t>(bytes.data(), std::endian::little));
+  }
+  for (const std::byte each : bytes) hash = mixed_with(hash, std::to_integer<std::uint64_t>(each));
+  return hash;
+}
 
 /// Hashes a row of 64 types or half floats.
 inline std::uint64_t hash_of_row(const std::array<std::uint16_t, 64>& row) {

@@ -20,6 +20,8 @@
 
 #include "core/bytes/text.h"
 #include "core/database/connection.h"
+#include "core/rows/packed_row.h"
+#include "io/column_scan.h"
 #include "io/luanti/luanti.h"
 
 namespace quoin {
@@ -259,29 +261,79 @@ class LuantiSource final : public ChunkSource {
       SourcePart result;
       ChunkBuilder builder(types_);
       for (IVec3 place = box.min; place.y < box.max.y; ++place.y) {
-        builder.begin();
-        for (int i = 0; i < kBlocksOfChunk * kBlocksOfChunk * kBlocksOfChunk; ++i) {
-          const IVec3 inside{i & 3, i >> 2 & 3, i >> 4};
-          if (auto read = put_block(reader, place, inside, builder, result.broken); !read) return read.error();
-        }
-        Chunk chunk = builder.take();
-        if (chunk.uniform() != kAir) result.chunks.push_back({place, std::move(chunk)});
+        auto chunk = read_chunk(reader, place, builder, result.broken);
+        if (!chunk) return chunk.error();
+        if (chunk->uniform() != kAir) result.chunks.push_back({place, std::move(*chunk)});
       }
       return result;
     });
   }
 
+  Result<VisitedColumns> visit_columns(std::size_t part, int top,
+                                       FunctionRef<bool(IVec3 voxel, VoxelType type)> visit) const override {
+    QUOIN_ASSERT(part < parts().size(), "a part of the source");
+    const IBox box = parts()[part];
+    return readers_->with_reader([&](Reader& reader) -> Result<VisitedColumns> {
+      VisitedColumns result;
+      ChunkBuilder builder(types_);
+      ColumnScan scan(top);
+      for (IVec3 place = box.max - 1; place.y >= box.min.y && !scan.is_done(); --place.y) {
+        if (place.y * kChunkEdge > top) continue;
+        const auto chunk = read_chunk(reader, place, builder, result.broken);
+        if (!chunk) return chunk.error();
+        scan.visit(place, *chunk, visit);
+        ++result.chunks;
+      }
+      return result;
+    });
+  }
+
+  Result<std::uint64_t> part_stamp(std::size_t part) const override {
+    QUOIN_ASSERT(part < parts().size(), "a part of the source");
+    const IBox box = parts()[part];
+    return readers_->with_reader([&](Reader& reader) -> Result<std::uint64_t> {
+      std::uint64_t stamp = kHashSeed;
+      for (IVec3 place = box.min; place.y < box.max.y; ++place.y) {
+        for (int i = 0; i < kBlocksOfChunk * kBlocksOfChunk * kBlocksOfChunk; ++i) {
+          const IVec3 ours = place * kBlocksOfChunk + IVec3(i & 3, i >> 2 & 3, i >> 4);
+          const StatementScope scope(reader.row);
+          bind(reader.row, {ours.x, ours.y, -1 - ours.z});
+          const auto found = reader.row.step();
+          // A row that cannot be read is part of the content.
+          const std::span<const std::byte> row = found && *found ? reader.row.bytes(0) : std::span<const std::byte>();
+          stamp = mixed_with(mixed_with(stamp, static_cast<std::uint64_t>(i)), row.size());
+          stamp = hash_of_bytes(stamp, row);
+        }
+      }
+      return stamp == 0 ? 1 : stamp;
+    });
+  }
+
  private:
+  Result<Chunk> read_chunk(Reader& reader, IVec3 chunk, ChunkBuilder& builder, std::vector<Error>& broken) const {
+    builder.begin();
+    for (int i = 0; i < kBlocksOfChunk * kBlocksOfChunk * kBlocksOfChunk; ++i) {
+      const IVec3 inside{i & 3, i >> 2 & 3, i >> 4};
+      if (auto read = put_block(reader, chunk, inside, builder, broken); !read) return read.error();
+    }
+    return builder.take();
+  }
+
+  /// Binds the position of a block to the statement that reads its row.
+  void bind(Statement& row, IVec3 place) const {
+    if (readers_->places() == Places::Number) {
+      row.bind(0, number_of(place));
+    } else {
+      for (int axis = 0; axis < 3; ++axis) row.bind(axis, std::int64_t{place[axis]});
+    }
+  }
+
   /// Adds one block of a chunk; `inside` is its position there. Appends errors to `broken`.
   Status put_block(Reader& reader, IVec3 chunk, IVec3 inside, ChunkBuilder& builder, std::vector<Error>& broken) const {
     const IVec3 ours = chunk * kBlocksOfChunk + inside;
     const IVec3 place{ours.x, ours.y, -1 - ours.z};
     const StatementScope scope(reader.row);
-    if (readers_->places() == Places::Number) {
-      reader.row.bind(0, number_of(place));
-    } else {
-      for (int axis = 0; axis < 3; ++axis) reader.row.bind(axis, std::int64_t{place[axis]});
-    }
+    bind(reader.row, place);
     const auto report = [&](const Error& error) {
       std::string what = "block " + to_string(place) + ": ";
       if (error.byte_offset) what += "byte " + std::to_string(*error.byte_offset) + " of its row: ";

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <array>
+#include <bit>
+#include <ctime>
 #include <list>
 #include <map>
 #include <mutex>
@@ -12,12 +14,14 @@
 #include <quoin/core/assert.h>
 #include <quoin/io/file.h>
 
+#include "core/rows/packed_row.h"
 #include "io/format_driver.h"
 #include "io/minecraft/block_types.h"
 #include "io/minecraft/minecraft.h"
 #include "io/minecraft/nbt.h"
 #include "io/minecraft/region_file.h"
 #include "io/minecraft/sections.h"
+#include "io/minecraft/signs.h"
 
 namespace quoin::minecraft {
 namespace {
@@ -29,6 +33,7 @@ constexpr int kColumnsOfRegion = kRegionEdge / kChunksOfColumn;  // along an edg
 // Section heights are signed bytes.
 constexpr int kLowestChunk = -32;
 constexpr int kHighestChunk = 32;
+constexpr int kTopOfWorld = kHighestChunk * kChunkEdge;
 /// Regions beyond this would have block coordinates outside int32, or too close to its limits for border reads.
 constexpr int kMaxRegion = 1 << 21;
 
@@ -135,35 +140,78 @@ class MinecraftSource final : public ChunkSource {
   VoxelRegistry types() const override { return types_.types(); }
 
   Result<SourcePart> read_part(std::size_t part) const override {
-    QUOIN_ASSERT(part < parts().size(), "a part of the source");
     SourcePart result;
-    QUOIN_ASSERT(region_of_.size() == parts().size(), "one region per part");
-    const std::size_t region = region_of_[part];
-    const auto file = regions_.open(region);
-    if (!file) {
-      result.broken.push_back(file.error());
-      return result;
-    }
-    const IVec3 column = parts()[part].min;
-    const RegionName name = regions_[region].name;
-    const int first_x = (column.x - name.x * kColumnsOfRegion) * kChunksOfColumn;
-    const int first_z = (column.z - name.z * kColumnsOfRegion) * kChunksOfColumn;
     ColumnBuilder builder(types_);
     SectionReader reader(types_);
-    for (int i = 0; i < kChunksOfColumn * kChunksOfColumn; ++i) {
-      const IVec3 chunk{first_x + i % kChunksOfColumn, 0, first_z + i / kChunksOfColumn};
-      if (!(*file)->has(chunk.x, chunk.z)) continue;
-      if (auto read = read_chunk(**file, name, chunk, reader, builder, result.broken); !read) return read.error();
-    }
+    const Status read = for_each_chunk(part, result.broken, [&](const RegionFile& file, RegionName name, IVec3 chunk) {
+      return read_chunk(file, name, chunk, result.broken, [&](nbt::Value root, IVec3 place, auto report) {
+        Status put;
+        Status sections = reader.read(
+            root, SectionOrder::AsStored, kTopOfWorld,
+            [&](const Section& section) {
+              put = builder.put(section, corner_of(place, section));
+              return put.has_value();
+            },
+            report);
+        return put ? sections : put;
+      });
+    });
+    if (!read) return read.error();
     result.chunks = builder.take();
     builder.take_invisible(result);
     return result;
   }
 
+  Result<VisitedColumns> visit_columns(std::size_t part, int top,
+                                       FunctionRef<bool(IVec3 voxel, VoxelType type)> visit) const override {
+    VisitedColumns result;
+    SectionReader reader(types_);
+    SectionTypes types;
+    const Status read = for_each_chunk(part, result.broken, [&](const RegionFile& file, RegionName name, IVec3 chunk) {
+      return read_chunk(file, name, chunk, result.broken, [&](nbt::Value root, IVec3 place, auto report) {
+        ++result.chunks;
+        add_signs(root, result.signs);
+        std::array<std::uint16_t, kSectionEdge> open{};  // columns that go on, by z
+        open.fill(0xFFFF);
+        Status found;
+        Status sections = reader.read(
+            root, SectionOrder::Downwards, top,
+            [&](const Section& section) {
+              found = types.find(section, types_);
+              if (!found) return false;
+              visit_section(section, types, corner_of(place, section), top, open, visit);
+              return std::ranges::any_of(open, [](std::uint16_t columns) { return columns != 0; });
+            },
+            report);
+        return found ? sections : found;
+      });
+    });
+    if (!read) return read.error();
+    return result;
+  }
+
+  Result<std::uint64_t> part_stamp(std::size_t part) const override {
+    std::uint64_t stamp = kHashSeed;
+    bool is_sure = true;
+    std::vector<Error> broken;
+    const Status read = for_each_chunk(part, broken, [&](const RegionFile& file, RegionName, IVec3 chunk) -> Status {
+      // The game's times are whole seconds: a chunk can be saved again within the one in which it is read.
+      constexpr std::time_t kUnsureSeconds = 2;
+      is_sure &= std::time_t{file.time(chunk.x, chunk.z)} + kUnsureSeconds < std::time(nullptr);
+      stamp = mixed_with(stamp, static_cast<std::uint64_t>(chunk.z * kRegionEdge + chunk.x));
+      stamp = mixed_with(stamp, file.stamp(chunk.x, chunk.z));
+      return {};
+    });
+    if (!read) return read.error();
+    if (!broken.empty() || !is_sure) return std::uint64_t{0};
+    return stamp == 0 ? 1 : stamp;
+  }
+
  private:
-  /// Adds one of the game's chunks to the builder. Reports broken data.
-  Status read_chunk(const RegionFile& file, RegionName name, IVec3 chunk, SectionReader& reader, ColumnBuilder& builder,
-                    std::vector<Error>& broken) const {
+  /// Reads one of the game's chunks: `use(root, place, report)`, with its position in chunks of the game. Reports broken
+  /// data. Errors: those of `use`, except BadFormat, which is broken data too.
+  template <class Use>
+  Status read_chunk(const RegionFile& file, RegionName name, IVec3 chunk, std::vector<Error>& broken, Use use) const {
     const IVec3 place{name.x * kRegionEdge + chunk.x, 0, name.z * kRegionEdge + chunk.z};
     const auto report = [&](const Error& error) {
       Error located = error;
@@ -186,20 +234,56 @@ class MinecraftSource final : public ChunkSource {
       report(document.error());
       return {};
     }
-    Status put;
-    Status read = reader.read(
-        document->root(),
-        [&](const Section& section) {
-          const IVec3 corner{place.x * kSectionEdge, section.y * kSectionEdge, place.z * kSectionEdge};
-          if (put) put = builder.put(section, corner);
-        },
-        report);
-    if (!put) return put;
-    if (!read && read.error().code == ErrorCode::BadFormat) {
-      report(read.error());
+    const Status used = use(document->root(), place, report);
+    if (!used && used.error().code == ErrorCode::BadFormat) {
+      report(used.error());
       return {};
     }
-    return read;
+    return used;
+  }
+
+  static IVec3 corner_of(IVec3 place, const Section& section) {
+    return IVec3{place.x, section.y, place.z} * kSectionEdge;
+  }
+
+  static void visit_section(const Section& section, const SectionTypes& types, IVec3 corner, int top,
+                            std::array<std::uint16_t, kSectionEdge>& open,
+                            FunctionRef<bool(IVec3 voxel, VoxelType type)> visit) {
+    for (int y = std::min(kSectionEdge - 1, top - corner.y); y >= 0; --y) {
+      for (int z = 0; z < kSectionEdge; ++z) {
+        std::uint16_t& columns = open[static_cast<std::size_t>(z)];
+        for (unsigned rest = columns; rest != 0; rest &= rest - 1) {
+          const int x = std::countr_zero(rest);
+          const VoxelType type = types.at(section, x, y, z);
+          if (type == kAir || visit(corner + IVec3(x, y, z), type)) continue;
+          columns = static_cast<std::uint16_t>(columns & ~(1U << x));
+        }
+      }
+    }
+  }
+
+  /// Calls `use(file, name, chunk)` for the game's chunks of a part that exist, while it returns no error; `chunk` is
+  /// the position in the region. Does nothing for a region that cannot be opened, and reports it.
+  template <class Use>
+  Status for_each_chunk(std::size_t part, std::vector<Error>& broken, Use use) const {
+    QUOIN_ASSERT(part < parts().size(), "a part of the source");
+    QUOIN_ASSERT(region_of_.size() == parts().size(), "one region per part");
+    const std::size_t region = region_of_[part];
+    const auto file = regions_.open(region);
+    if (!file) {
+      broken.push_back(file.error());
+      return {};
+    }
+    const IVec3 column = parts()[part].min;
+    const RegionName name = regions_[region].name;
+    const int first_x = (column.x - name.x * kColumnsOfRegion) * kChunksOfColumn;
+    const int first_z = (column.z - name.z * kColumnsOfRegion) * kChunksOfColumn;
+    for (int i = 0; i < kChunksOfColumn * kChunksOfColumn; ++i) {
+      const IVec3 chunk{first_x + i % kChunksOfColumn, 0, first_z + i / kChunksOfColumn};
+      if (!(*file)->has(chunk.x, chunk.z)) continue;
+      if (Status used = use(**file, name, chunk); !used) return used;
+    }
+    return {};
   }
 
   std::vector<std::uint32_t> region_of_;  // by part

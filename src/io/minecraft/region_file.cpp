@@ -18,6 +18,7 @@
 
 #include "core/bytes/bytes.h"
 #include "core/bytes/files.h"
+#include "core/rows/packed_row.h"
 #include "io/byte_stream.h"
 
 #ifdef QUOIN_HAVE_ZSTD
@@ -167,6 +168,7 @@ Result<std::unique_ptr<RegionFile>> RegionFile::open(const std::filesystem::path
   if (::fstat(descriptor, &info) != 0) return cannot();
   if (!S_ISREG(info.st_mode)) return make_error(ErrorCode::CannotRead, "not a regular file", path.string());
   file->size_ = static_cast<std::uint64_t>(info.st_size);
+  file->file_time_ = static_cast<std::uint32_t>(info.st_mtime);
   if (auto done = file->read_table(); !done) return done.error();
   return file;
 }
@@ -206,7 +208,18 @@ Status RegionFile::read_table() {
   for (std::size_t i = 0; i < table_.size(); ++i) {
     table_[i] = load<std::uint32_t>(table.data() + 4 * i, std::endian::big);
   }
+  std::array<std::byte, kSectorBytes> times{};  // 0 past the end of the file
+  if (const auto read = read_at(kSectorBytes, times); !read) return read.error();
+  for (std::size_t i = 0; i < times_.size(); ++i) {
+    times_[i] = load<std::uint32_t>(times.data() + 4 * i, std::endian::big);
+  }
   return {};
+}
+
+std::uint64_t RegionFile::stamp(int x, int z) const {
+  if (!has(x, z)) return 0;
+  if (linear_) return mixed_with(mixed_with(kHashSeed, file_time_), size_);
+  return mixed_with(mixed_with(kHashSeed, entry(x, z)), time(x, z));
 }
 
 Result<std::size_t> RegionFile::read_at(std::uint64_t offset, std::span<std::byte> out) const {

@@ -118,6 +118,11 @@ class RegionFile {
   [[nodiscard]] std::uint64_t offset(int x, int z) const {
     return linear_ ? LinearRegion::kDataOffset : std::uint64_t{entry(x, z) >> 8} * 4096;
   }
+  /// Returns a number that differs after the game has saved the chunk, 0 for a chunk that does not exist; from the
+  /// file's table, or of a Linear file from its time.
+  [[nodiscard]] std::uint64_t stamp(int x, int z) const;
+  /// Returns the time of the chunk's last save, in seconds since 1970. Requires: 0 <= x, z < 32.
+  [[nodiscard]] std::uint32_t time(int x, int z) const { return linear_ ? file_time_ : times_[index_of(x, z)]; }
   /// Returns true if all chunks of the file are held in memory once one is read.
   [[nodiscard]] bool is_expanded_whole() const { return linear_ != nullptr; }
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
@@ -141,7 +146,9 @@ class RegionFile {
   int descriptor_;                // -1: reads `bytes_`
   std::vector<std::byte> bytes_;  // for data without a file
   std::uint64_t size_ = 0;
+  std::uint32_t file_time_ = 0;
   std::array<std::uint32_t, kRegionEdge * kRegionEdge> table_{};
+  std::array<std::uint32_t, kRegionEdge * kRegionEdge> times_{};
   std::unique_ptr<const LinearRegion> linear_;
 };
 

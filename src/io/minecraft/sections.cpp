@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <functional>
 #include <iterator>
 #include <numbers>
 #include <string>
@@ -16,6 +17,7 @@ namespace quoin::minecraft {
 
 namespace {
 
+constexpr std::int64_t kMaxSection = 1'000;  // beyond all heights that read_section accepts
 constexpr std::size_t kLegacyCodes = std::size_t{4096} * 16;
 
 std::uint64_t word(std::span<const std::byte> longs, std::size_t i) {
@@ -139,12 +141,16 @@ Status SectionReader::read_legacy(nbt::Value section) {
 }
 
 // 16 x 128 x 16 blocks in one array, by x, then z, then y.
-Status SectionReader::read_mcregion(nbt::Value level, FunctionRef<void(const Section&)> take) {
+Status SectionReader::read_mcregion(nbt::Value level, SectionOrder order, int top,
+                                    FunctionRef<bool(const Section&)> take) {
   constexpr std::size_t kHeight = 128;
   const auto blocks = level["Blocks"].bytes();
   const auto data = level["Data"].bytes();
   if (blocks.size() != kHeight * 256) return fault("a chunk has " + std::to_string(blocks.size()) + " blocks", level);
-  for (int y = 0; y < 8; ++y) {
+  constexpr int kSections = 8;
+  for (int number = 0; number < kSections; ++number) {
+    const int y = order == SectionOrder::Downwards ? kSections - 1 - number : number;
+    if (y * kSectionEdge > top) continue;
     begin_legacy();
     Status done;
     for (std::size_t i = 0; i < kSectionBlocks && done; ++i) {
@@ -157,7 +163,7 @@ Status SectionReader::read_mcregion(nbt::Value level, FunctionRef<void(const Sec
     if (!done) return done;
     section_.y = y;
     read_biomes({}, level);
-    if (!is_air()) take(section_);
+    if (!is_air() && !take(section_)) return {};
   }
   return {};
 }
@@ -236,24 +242,31 @@ Status SectionReader::read_section(nbt::Value section, nbt::Value level) {
   return {};
 }
 
-Status SectionReader::read(nbt::Value root, FunctionRef<void(const Section&)> take,
+Status SectionReader::read(nbt::Value root, SectionOrder order, int top, FunctionRef<bool(const Section&)> take,
                            FunctionRef<void(const Error&)> broken) {
   const nbt::Value level = root["Level"] ? root["Level"] : root;
-  nbt::Value sections = nbt::first_of(level, "sections", "Sections");
-  if (!sections && level["Blocks"]) return read_mcregion(level, take);
-  Status done;
-  sections.for_each([&](nbt::Value section) {
-    if (!done) return;
+  const nbt::Value stored = nbt::first_of(level, "sections", "Sections");
+  if (!stored && level["Blocks"]) return read_mcregion(level, order, top, take);
+  sections_.clear();
+  // A section without a height is broken, which `read_section` reports.
+  stored.for_each([&](nbt::Value section) {
+    const auto y = std::clamp<std::int64_t>(section["Y"].integer().value_or(0), -kMaxSection, kMaxSection);
+    if (y * kSectionEdge <= top) sections_.emplace_back(static_cast<int>(y), section);
+  });
+  if (order == SectionOrder::Downwards) {
+    std::ranges::stable_sort(sections_, std::greater(), [](const auto& each) { return each.first; });
+  }
+  for (const auto& [y, section] : sections_) {
     const Status read = read_section(section, level);
     if (!read && read.error().code == ErrorCode::BadFormat) {
       broken(read.error());
     } else if (!read) {
-      done = read;
-    } else if (!is_air()) {
-      take(section_);
+      return read;
+    } else if (!is_air() && !take(section_)) {
+      return {};
     }
-  });
-  return done;
+  }
+  return {};
 }
 
 namespace {
@@ -279,19 +292,20 @@ ColumnBuilder::Cell& ColumnBuilder::cell(IVec3 place) {
   return cells_.emplace_back(std::move(fresh));
 }
 
-Status ColumnBuilder::find_types(const Section& section) {
+Status SectionTypes::find(const Section& section, BlockTypes& types) {
   const std::size_t size = section.palette.size();
-  has_states_ = std::ranges::any_of(section.palette, [](const Block& block) { return block.state != 0; });
   has_tints_ = std::ranges::any_of(section.palette, [](const Block& block) { return block.tint != Tint::None; });
   const std::size_t biomes = has_tints_ ? section.biomes.size() : 1;
-  types_of_.resize(size * biomes);
+  QUOIN_ASSERT(!has_tints_ || section.biome_indices.size() == 256 || section.biome_indices.size() == 64,
+               "biomes of columns or of cells");
+  types_.resize(size * biomes);
   for (std::size_t biome = 0; biome < biomes; ++biome) {
     for (std::size_t i = 0; i < size; ++i) {
       const Block& block = section.palette[i];
-      VoxelType& type = types_of_[biome * size + i];
+      VoxelType& type = types_[biome * size + i];
       type = block.type;
       if (block.tint == Tint::None) continue;
-      const auto tinted = types_.tinted(block, section.biomes[biome]);
+      const auto tinted = types.tinted(block, section.biomes[biome]);
       if (!tinted) return tinted.error();
       type = *tinted;
     }
@@ -302,21 +316,21 @@ Status ColumnBuilder::find_types(const Section& section) {
 void ColumnBuilder::fill(const Section& section, Cell& cell, IVec3 first) const {
   const std::size_t size = section.palette.size();
   const bool is_by_column = section.biome_indices.size() == 256;
-  QUOIN_ASSERT(is_by_column || section.biome_indices.size() == 64 || !has_tints_, "biomes of columns or of cells");
-  QUOIN_ASSERT(types_of_.size() >= size, "types of the whole palette");
+  const std::vector<VoxelType>& types = types_of_.types();
+  QUOIN_ASSERT(types.size() >= size, "types of the whole palette");
   for (int y = 0; y < kSectionEdge; ++y) {
     for (int z = 0; z < kSectionEdge; ++z) {
       const auto row = static_cast<std::size_t>((first.z + z) * kChunkEdge + first.y + y) * kChunkEdge +
                        static_cast<std::size_t>(first.x);
       const std::uint16_t* const indices = section.indices.data() + (y * kSectionEdge + z) * kSectionEdge;
       VoxelType* const out = cell.types.data() + row;
-      if (!has_tints_) {
-        for (std::size_t x = 0; x < kSectionEdge; ++x) out[x] = types_of_[indices[x]];
+      if (!types_of_.has_tints()) {
+        for (std::size_t x = 0; x < kSectionEdge; ++x) out[x] = types[indices[x]];
       } else {
         const std::uint8_t* const biomes =
             section.biome_indices.data() + (is_by_column ? z * 16 : (y >> 2) * 16 + (z >> 2) * 4);
         for (std::size_t x = 0; x < kSectionEdge; ++x) {
-          out[x] = types_of_[biomes[is_by_column ? x : x >> 2] * size + indices[x]];
+          out[x] = types[biomes[is_by_column ? x : x >> 2] * size + indices[x]];
         }
       }
       if (!has_states_) continue;
@@ -365,7 +379,8 @@ Status ColumnBuilder::put(const Section& section, IVec3 corner) {
     count_invisible(section, corner);
     if (is_unseen(section)) return {};
   }
-  if (auto found = find_types(section); !found) return found;
+  if (auto found = types_of_.find(section, types_); !found) return found;
+  has_states_ = std::ranges::any_of(section.palette, [](const Block& block) { return block.state != 0; });
   fill(section, cell(chunk_of(corner)), local_of(corner));
   return {};
 }

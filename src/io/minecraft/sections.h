@@ -29,23 +29,28 @@ struct Section {
   std::vector<BiomeTints> biomes;  ///< the section's biomes, at least one
 };
 
+/// The order of a chunk's sections. Downwards: those that are no longer wanted are not decoded.
+enum class SectionOrder : std::uint8_t { AsStored, Downwards };
+
 /// Reads the sections of a chunk's NBT one after the other, of any version from McRegion on. Reports broken sections
 /// and continues with the others.
 ///
-/// `take`:   receives each section that is not all air; must not keep references to it.
+/// `top`:    sections that begin above this height are skipped.
+/// `take`:   receives each section that is not all air; must not keep references to it. Returns false to stop.
 /// `broken`: receives errors, with their offset in the NBT.
 /// Errors: LimitExceeded.
 class SectionReader {
  public:
   explicit SectionReader(BlockTypes& types) : types_(types) {}
 
-  [[nodiscard]] Status read(nbt::Value root, FunctionRef<void(const Section&)> take,
+  [[nodiscard]] Status read(nbt::Value root, SectionOrder order, int top, FunctionRef<bool(const Section&)> take,
                             FunctionRef<void(const Error&)> broken);
 
  private:
   [[nodiscard]] Status read_section(nbt::Value section, nbt::Value level);
   [[nodiscard]] Status read_legacy(nbt::Value section);
-  [[nodiscard]] Status read_mcregion(nbt::Value level, FunctionRef<void(const Section&)> take);
+  [[nodiscard]] Status read_mcregion(nbt::Value level, SectionOrder order, int top,
+                                     FunctionRef<bool(const Section&)> take);
   [[nodiscard]] Status put_legacy(std::size_t at, int id, int data);
   void begin_legacy();
   void end_legacy();
@@ -56,6 +61,29 @@ class SectionReader {
   Section section_;
   std::vector<std::uint16_t> legacy_index_;  // by id and data: in the palette; kNoIndex
   std::vector<std::uint32_t> legacy_used_;
+  std::vector<std::pair<int, nbt::Value>> sections_;  // with their heights
+};
+
+/// The types of a section's blocks.
+class SectionTypes {
+ public:
+  /// Finds the types of all blocks of the palette, in all biomes. Errors: LimitExceeded.
+  [[nodiscard]] Status find(const Section& section, BlockTypes& types);
+  /// Returns true if any block's type depends on the biome.
+  [[nodiscard]] bool has_tints() const { return has_tints_; }
+  /// Returns the types by [biome][index in the palette]; of one biome without tints.
+  [[nodiscard]] const std::vector<VoxelType>& types() const { return types_; }
+  /// Returns the type of a block. Requires: as the section was found; 0 <= x, y, z < 16.
+  [[nodiscard]] VoxelType at(const Section& section, int x, int y, int z) const {
+    const std::size_t index = section.indices[static_cast<std::size_t>((y * kSectionEdge + z) * kSectionEdge + x)];
+    if (!has_tints_) return types_[index];
+    const int biome = section.biome_indices.size() == 256 ? z * 16 + x : (y >> 2) * 16 + (z >> 2) * 4 + (x >> 2);
+    return types_[section.biome_indices[static_cast<std::size_t>(biome)] * section.palette.size() + index];
+  }
+
+ private:
+  std::vector<VoxelType> types_;
+  bool has_tints_ = false;
 };
 
 /// Returns the i-th half byte, low halves first; 0 past the end: old worlds omit trailing zeros.
@@ -91,18 +119,16 @@ class ColumnBuilder {
     std::vector<std::pair<std::uint32_t, std::uint32_t>> states;  // voxel, state
   };
   [[nodiscard]] Cell& cell(IVec3 place);
-  [[nodiscard]] Status find_types(const Section& section);
   void fill(const Section& section, Cell& cell, IVec3 first) const;
   void count_invisible(const Section& section, IVec3 corner);
 
   BlockTypes& types_;
   std::vector<Cell> cells_;
-  std::vector<Cell> spare_;               // reused memory
-  std::vector<VoxelType> types_of_;       // [biome][index in the palette]
+  std::vector<Cell> spare_;  // reused memory
+  SectionTypes types_of_;
   std::vector<std::uint64_t> invisible_;  // by Block::invisible
   std::vector<Lamp> lamps_;
   bool has_states_ = false;
-  bool has_tints_ = false;
 };
 
 }  // namespace quoin::minecraft

@@ -55,6 +55,11 @@ class PackedSource final : public ChunkSource {
   }
 
   [[nodiscard]] Result<SourcePart> read_part(std::size_t part) const override { return source_->read_part(part); }
+  [[nodiscard]] Result<VisitedColumns> visit_columns(
+      std::size_t part, int top, FunctionRef<bool(IVec3 voxel, VoxelType type)> visit) const override {
+    return source_->visit_columns(part, top, visit);
+  }
+  [[nodiscard]] Result<std::uint64_t> part_stamp(std::size_t part) const override { return source_->part_stamp(part); }
 
  private:
   static ChunkSourceInfo with_identity(ChunkSourceInfo info, const BlockPacks& packs) {
