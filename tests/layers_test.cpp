@@ -19,9 +19,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::map<std::string, int> kLevels = {{"core", 0},    {"grid", 1},     {"mesh", 2},  {"trace", 2},
-                                            {"terrain", 2}, {"voxelize", 2}, {"scene", 3}, {"render", 4},
-                                            {"io", 4},      {"live", 5},     {"store", 5}, {"stream", 6}};
+const std::map<std::string, int> kLevels = {{"core", 0},     {"grid", 1},   {"mesh", 2},   {"trace", 2}, {"terrain", 2},
+                                            {"voxelize", 2}, {"scene", 3},  {"render", 4}, {"io", 4},    {"live", 5},
+                                            {"store", 5},    {"stream", 6}, {"map", 6}};
 constexpr int kAppsLevel = 7;
 
 // Lists the private headers that higher layers use, and the users. A new line is a decision: the alternative is a
@@ -31,7 +31,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/chunk/chunk_storage.h", {"mesh", "render", "store", "trace"}},
     {"grid/colour_table.h", {"io", "voxelize"}},
     {"grid/density/density_storage.h", {"mesh", "store", "trace"}},
-    {"grid/shapes/shape_index.h", {"render", "scene"}},
+    {"grid/shapes/shape_index.h", {"map", "render", "scene"}},
     {"io/format_driver.h", {"store"}},
     {"io/scene_file/scene_parts.h", {"store"}},
     {"scene/surfaces.h", {"io", "render"}},
@@ -54,14 +54,14 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
 };
 
 // Pairs of a lent header and its user. Lower it when a pair goes; a higher number needs a reason in docs/decisions.
-constexpr std::size_t kMaxLoans = 36;
+constexpr std::size_t kMaxLoans = 37;
 
 // A file with fewer lines needs a reason, because compile time and a reader's way are paid per file.
 constexpr int kSmallFile = 60;
 constexpr int kMaxLines = 900;
 // Numbers of C++ files without tests in src, include and apps. They only rise for a new subject, such as a format: a
 // change that merges files lowers them.
-constexpr int kMaxSources = 730;
+constexpr int kMaxSources = 750;
 constexpr int kMaxSmallSources = 83;
 
 // A folder with more files should be split.

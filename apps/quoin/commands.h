@@ -96,6 +96,7 @@ void add_render_command(CLI::App& app, int& status);
 void add_thumbnail_command(CLI::App& app, int& status);
 void add_generate_command(CLI::App& app, int& status);
 void add_view_command(CLI::App& app, int& status);
+void add_map_command(CLI::App& app, int& status);
 void add_world_command(CLI::App& app, int& status);
 /// Adds `completions` and `man`, which describe all commands.
 void add_shell_commands(CLI::App& app, int& status);

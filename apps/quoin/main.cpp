@@ -109,6 +109,7 @@ int run(int argc, char** argv) {
   add_thumbnail_command(app, status);
   add_generate_command(app, status);
   add_view_command(app, status);
+  add_map_command(app, status);
   add_world_command(app, status);
   add_shell_commands(app, status);
   const Arguments arguments = readable_arguments(argc, argv);

@@ -62,6 +62,7 @@
 #include <quoin/live/live_light.h>
 #include <quoin/live/live_meshes.h>
 #include <quoin/live/live_tracer.h>
+#include <quoin/map/world_map.h>
 #include <quoin/mesh/array_surface.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/label_surfaces.h>

@@ -32,13 +32,13 @@ using Json = nlohmann::json;
 using FileBytes = std::optional<std::vector<std::byte>>;
 
 constexpr char kNodeFamilyTable[] =
-#include "block_pack_node_families.inc"
+#include "block_pack_node_families.json.inc"
     ;
 constexpr char kNodeRuleTable[] =
-#include "block_pack_node_rules.inc"
+#include "block_pack_node_rules.json.inc"
     ;
 constexpr char kTileTable[] =
-#include "block_pack_node_tiles.inc"
+#include "block_pack_node_tiles.json.inc"
     ;
 
 constexpr std::string_view kTileFolder = "assets/luanti/textures/block/";

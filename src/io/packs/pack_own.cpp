@@ -28,13 +28,13 @@ namespace {
 constexpr std::size_t kMaxLayers = 8;
 
 constexpr char kFamilyTable[] =
-#include "block_pack_families.inc"
+#include "block_pack_families.json.inc"
     ;
 constexpr char kRuleTable[] =
-#include "block_pack_rules.inc"
+#include "block_pack_rules.json.inc"
     ;
 constexpr char kTextureTable[] =
-#include "block_pack_textures.inc"
+#include "block_pack_textures.json.inc"
     ;
 
 std::optional<std::uint32_t> parse_colour(std::string_view text) {

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <quoin/core/result.h>
+#include <quoin/io/chunk_source.h>
+#include <quoin/map/world_map.h>
+
+#include "map/map_log.h"
+
+namespace quoin::map {
+
+/// One map of a folder: a dimension. The page switches between them.
+struct MapLayer {
+  std::string key;  ///< "overworld", "nether", "NAMESPACE-NAME": names files, and the layer in the page's address
+  std::filesystem::path log;
+  std::filesystem::path tiles;
+  std::string extension;
+  std::optional<int> ceiling;
+  [[nodiscard]] std::filesystem::path tile(TilePlace place) const;
+};
+
+/// The folder of a world's maps: tiles, the log of each layer, and the page.
+class MapFolder {
+ public:
+  /// Makes the folder if it does not exist. Errors: CannotWrite.
+  [[nodiscard]] static Result<MapFolder> open(const std::filesystem::path& folder, const ChunkSource& source,
+                                              const MapOptions& options);
+
+  [[nodiscard]] const MapLayer& layer() const { return layer_; }
+  /// Returns the world and the options that the layer's tiles depend on, on one line.
+  [[nodiscard]] const std::string& identity() const { return identity_; }
+  /// Writes index.html, and what it shows of this layer: state/KEY.json; then layers.js and markers.js of all layers.
+  /// Errors: CannotWrite.
+  [[nodiscard]] Status write_page(const ChunkSource& source, const MapLog& log) const;
+
+ private:
+  std::filesystem::path folder_;
+  MapLayer layer_;
+  std::string identity_;
+};
+
+/// Returns signs as a JSON list of [x, y, z, "text"], sorted by place; empty if there are none.
+[[nodiscard]] std::string text_of_signs(std::vector<SourceSign> signs);
+
+}  // namespace quoin::map

@@ -1,0 +1,218 @@
+#include "map/other_sources.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <quoin/core/assert.h>
+#include <quoin/core/thousands.h>
+#include <quoin/grid/copy_box.h>
+#include <quoin/map/world_map.h>
+
+#include "core/rows/packed_row.h"
+
+namespace quoin::map {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Makes parts of chunks: one per column, from the lowest chunk to the highest.
+std::vector<IBox> columns_of(std::vector<IVec3> chunks) {
+  std::ranges::sort(chunks, {}, [](IVec3 c) { return std::tuple(c.z, c.x, c.y); });
+  std::vector<IBox> parts;
+  for (const IVec3 chunk : chunks) {
+    if (parts.empty() || parts.back().min.x != chunk.x || parts.back().min.z != chunk.z) {
+      parts.push_back({chunk, chunk + 1});
+    }
+    parts.back().max.y = chunk.y + 1;
+  }
+  return parts;
+}
+
+IBox bounds_of(const std::vector<IBox>& parts) {
+  IBox bounds;
+  for (const IBox& part : parts) bounds = unite(bounds, part);
+  return bounds;
+}
+
+/// Returns a hash of what a map shows of all types.
+std::uint64_t hash_of_types(const VoxelRegistry& types) {
+  std::uint64_t hash = kHashSeed;
+  for (std::size_t i = 0; i < types.size(); ++i) {
+    const VoxelProperties& type = types[static_cast<VoxelType>(i)];
+    const auto shown = {std::uint64_t{type.colour.r},
+                        std::uint64_t{type.colour.g},
+                        std::uint64_t{type.colour.b},
+                        std::uint64_t{type.colour.a},
+                        static_cast<std::uint64_t>(type.visibility),
+                        std::uint64_t{type.emission > 0.0F}};
+    for (const std::uint64_t value : shown) hash = mixed_with(hash, value);
+  }
+  return hash;
+}
+
+/// Returns a stamp of chunks that keep their types: worlds and scenes number them in the file.
+std::uint64_t stamp_of(const std::vector<SourceChunk>& chunks, std::uint64_t types) {
+  std::uint64_t stamp = types;
+  for (const SourceChunk& each : chunks) {
+    stamp = mixed_with(mixed_with(stamp, static_cast<std::uint32_t>(each.chunk.y)), each.voxels.content_hash());
+  }
+  return stamp == 0 ? 1 : stamp;
+}
+
+/// A source whose types are all known when it is opened.
+class FixedTypes : public ChunkSource {
+ public:
+  VoxelRegistry types() const override { return types_; }
+  Result<std::uint64_t> part_stamp(std::size_t part) const override {
+    const auto content = read_part(part);
+    if (!content) return content.error();
+    // A part that cannot be read is drawn again when it can.
+    return content->broken.empty() ? stamp_of(content->chunks, types_hash_) : 0;
+  }
+
+ protected:
+  FixedTypes(ChunkSourceInfo info, std::vector<IBox> parts, VoxelRegistry types)
+      : ChunkSource(std::move(info), std::move(parts)), types_(std::move(types)), types_hash_(hash_of_types(types_)) {}
+
+ private:
+  VoxelRegistry types_;
+  std::uint64_t types_hash_;
+};
+
+class WorldSource final : public FixedTypes {
+ public:
+  WorldSource(ChunkSourceInfo info, std::vector<IBox> parts, VoxelRegistry types, WorldStore world, std::uint32_t grid)
+      : FixedTypes(std::move(info), std::move(parts), std::move(types)), world_(std::move(world)), grid_(grid) {}
+
+  Result<SourcePart> read_part(std::size_t part) const override {
+    QUOIN_ASSERT(part < parts().size(), "a part of the source");
+    SourcePart result;
+    const IBox& box = parts()[part];
+    for (IVec3 place = box.min; place.y < box.max.y; ++place.y) {
+      auto chunk = world_.load_chunk({.grid = grid_, .chunk = place});
+      if (!chunk && chunk.error().code == ErrorCode::BadFormat) {
+        result.broken.push_back(chunk.error());
+      } else if (!chunk) {
+        return chunk.error();
+      } else if (*chunk && (*chunk)->voxels.uniform() != kAir) {
+        result.chunks.push_back({place, std::move((*chunk)->voxels)});
+      }
+    }
+    return result;
+  }
+
+ private:
+  WorldStore world_;
+  std::uint32_t grid_;
+};
+
+class SceneSource final : public FixedTypes {
+ public:
+  SceneSource(ChunkSourceInfo info, std::vector<IBox> parts, VoxelRegistry types, Grid grid)
+      : FixedTypes(std::move(info), std::move(parts), std::move(types)), grid_(std::move(grid)) {}
+
+  Result<SourcePart> read_part(std::size_t part) const override {
+    QUOIN_ASSERT(part < parts().size(), "a part of the source");
+    SourcePart result;
+    const IBox& box = parts()[part];
+    for (IVec3 place = box.min; place.y < box.max.y; ++place.y) {
+      if (const Chunk* const chunk = grid_.find_chunk(place)) result.chunks.push_back({place, *chunk});
+    }
+    return result;
+  }
+
+ private:
+  Grid grid_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<ChunkSource>> source_of_world(WorldStore world) {
+  auto types = world.types();
+  if (!types) return types.error();
+  const auto grids = world.grids();
+  if (!grids) return grids.error();
+  ChunkSourceInfo info;
+  info.format = "quoin";
+  info.name = world.path().stem().string();
+  std::vector<IVec3> most;
+  std::uint32_t chosen = 0;
+  for (const auto& [number, grid] : *grids) {
+    auto chunks = world.chunks(number, 0);
+    if (!chunks) return chunks.error();
+    if (chunks->size() <= most.size()) continue;
+    most = std::move(*chunks);
+    chosen = number;
+    if (!grid.name.empty()) info.name = grid.name;
+  }
+  if (grids->size() > 1) {
+    info.warnings.push_back("the map shows the grid with the most chunks, and leaves out " +
+                            with_thousands(static_cast<std::int64_t>(grids->size() - 1)) + " other grids");
+  }
+  std::vector<IBox> parts = columns_of(std::move(most));
+  info.chunks = bounds_of(parts);
+  return std::unique_ptr<ChunkSource>(
+      new WorldSource(std::move(info), std::move(parts), std::move(*types), std::move(world), chosen));
+}
+
+std::unique_ptr<ChunkSource> source_of_scene(LoadedScene loaded, const fs::path& path) {
+  const Scene& scene = loaded.scene;
+  Grid merged;
+  std::size_t left_out = 0;
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    const Instance& instance = scene.instances()[handle];
+    const Grid& grid = scene.grids()[instance.grid].grid;
+    if (grid.bounds().empty()) continue;
+    constexpr double kNear = 1e-6;
+    const DVec3 position = instance.position - scene.grids()[instance.grid].pivot;
+    const IVec3 to(glm::round(position));
+    const bool is_whole = glm::length(position - DVec3(to)) < kNear && std::abs(instance.voxel_size - 1.0) < kNear &&
+                          std::abs(std::abs(instance.rotation.w) - 1.0) < kNear && instance.group == GroupHandle();
+    if (!is_whole) {
+      ++left_out;
+      continue;
+    }
+    const IBox box = grid.bounds();
+    copy_box(grid, box, merged, box.min + to, {}, {.copy_air = false});
+  }
+  ChunkSourceInfo info;
+  info.format = loaded.format;
+  info.name = path.stem().string();
+  info.warnings = std::move(loaded.warnings);
+  if (left_out > 0) {
+    info.warnings.push_back("the map leaves out " + with_thousands(static_cast<std::int64_t>(left_out)) +
+                            " models that are turned, scaled or not at whole voxels");
+  }
+  std::vector<IBox> parts = columns_of(merged.chunks());
+  info.chunks = bounds_of(parts);
+  return std::make_unique<SceneSource>(std::move(info), std::move(parts), scene.types, std::move(merged));
+}
+
+}  // namespace quoin::map
+
+namespace quoin {
+
+Result<std::unique_ptr<ChunkSource>> open_map_source(const std::filesystem::path& path, const LoadOptions& options,
+                                                     Threads threads, const Progress& progress) {
+  auto file = detect_file(path);
+  if (!file) return file.error();
+  if (can(file->format, FormatCapability::Chunks)) return open_chunk_source(*file, options.dimension);
+  if (file->format == FileFormat::World) {
+    auto world = WorldStore::open(path, WorldAccess::Read, threads);
+    if (!world) return world.error();
+    return map::source_of_world(std::move(*world));
+  }
+  auto loaded = load_scene(*file, options, threads, progress);
+  if (!loaded) return loaded.error();
+  return map::source_of_scene(std::move(*loaded), path);
+}
+
+}  // namespace quoin
