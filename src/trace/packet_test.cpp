@@ -14,6 +14,7 @@
 #include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
 #include "core/not_finite_for_tests.h"
+#include "core/work/nightly_for_tests.h"
 #include "grid/change_follower_for_tests.h"
 #include "mesh/mesh_oracle.h"
 #include "trace/kernel/ray_kernel.h"
@@ -398,7 +399,7 @@ TEST_P(Packets, ParallelRaysThroughLongWorldAgree) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, Packets,
-                         testing::Combine(testing::Range(1U, 9U),
+                         testing::Combine(testing::Range(1U, static_cast<unsigned>(cases(5, 9))),
                                           testing::Values(InstructionSet::Avx2, InstructionSet::Avx512)),
                          [](const auto& each) {
                            return std::to_string(std::get<0>(each.param)) + name_in_tests(std::get<1>(each.param));

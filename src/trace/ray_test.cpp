@@ -11,6 +11,7 @@
 #include "bench/workloads.h"
 #include "core/instruction_sets_for_tests.h"
 #include "core/not_finite_for_tests.h"
+#include "core/work/nightly_for_tests.h"
 #include "grid/change_follower_for_tests.h"
 #include "mesh/mesh_oracle.h"
 #include "trace/trace_oracle.h"
@@ -126,7 +127,7 @@ TEST_P(Rays, DistantRaysMatchDenseTracer) {
   EXPECT_GT(tally.hits, 10);
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, Rays, testing::Range(1U, 13U));
+INSTANTIATE_TEST_SUITE_P(Seeds, Rays, testing::Range(1U, static_cast<unsigned>(cases(7, 13))));
 
 TEST(Ray, HitsAreTheSameFarFromOrigin) {
   const IVec3 away{1'000'000'000, -1'000'000'000, 999'999'937};

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <quoin/io/file.h>
 
+#include "core/work/nightly_for_tests.h"
 #include "io/vox/vox_for_tests.h"
 
 namespace quoin {
@@ -105,6 +106,8 @@ TEST(VoxHostile, SurvivesAnyChangedByte) {
   const std::vector<std::byte> whole = full_file();
   for (std::size_t at = 0; at < whole.size(); ++at) {
     for (const int value : {0, 0x7F, 0x80, 0xFF}) {
+      // By day every byte takes two of the values.
+      if (!is_nightly() && (at + static_cast<std::size_t>(value)) % 2 != 0) continue;
       std::vector<std::byte> changed = whole;
       changed[at] = static_cast<std::byte>(value);
       ASSERT_EQ(wrong_with(changed), "") << "byte " << at << " is " << value;

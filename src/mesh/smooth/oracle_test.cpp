@@ -117,7 +117,7 @@ TEST_P(SmoothKernels, MatchOracleOcclusion) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, SmoothKernels, testing::Range(1U, 4U));
+INSTANTIATE_TEST_SUITE_P(Seeds, SmoothKernels, testing::Range(1U, static_cast<unsigned>(cases(3, 4))));
 
 // The oracle shares the arithmetic of a cell with the kernels, so it is compared with doubles here.
 TEST(SmoothCell, HasVertexAtMeanOfCrossings) {

@@ -12,6 +12,7 @@
 #include <quoin/mesh/smooth_mesh.h>
 
 #include "core/death_for_tests.h"
+#include "core/work/nightly_for_tests.h"
 #include "mesh/smooth/level_cells.h"
 #include "mesh/smooth/surface_check_for_tests.h"
 
@@ -148,7 +149,7 @@ TEST_P(SplitNoise, IsManifoldAtEveryLevel) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, SplitNoise, testing::Range(1U, 6U));
+INSTANTIATE_TEST_SUITE_P(Seeds, SplitNoise, testing::Range(1U, static_cast<unsigned>(cases(3, 6))));
 
 TEST(SmoothSheets, LeaveSingleSheetCellsUnchanged) {
   const DensityGrid grid = grid_of({IVec3{-1}, IVec3{66}}, oracle::waves(11, 7.0));

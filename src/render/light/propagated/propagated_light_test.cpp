@@ -273,7 +273,7 @@ TEST(PropagatedLight, MatchesSearchAfterRandomEdits) {
         types.replace(kStone, stone);
       }
       light.update(grid, types, {1 + seed % 2});
-      if ((step + 1) % cases(6, 3) == 0) expect_searched(light, grid, types);
+      if ((step + 1) % cases(12, 3) == 0) expect_searched(light, grid, types);
       if (HasFatalFailure()) return;
     }
     PropagatedLight fresh;
