@@ -128,7 +128,7 @@ void add_map_command(CLI::App& app, int& status) {
   command
       ->add_option(
           "--ceiling", options->map.ceiling,
-          "Height at which the world is cut, to see below a roof (default: 100 in Minecraft's nether, else none)")
+          "Cut the world at this height, to see below a roof (default: 100 in Minecraft's nether, else none)")
       ->type_name("Y");
   set_heading(*command, heading::kInput);
   add_dimension_option(*command, options->load);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <ctime>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <map>
 #include <random>
@@ -201,6 +202,46 @@ TEST(PartStamp, ChangesWithTimeOrPlaceOfAnyChunk) {
   for (std::size_t i = 0; i < 4; ++i) region[time + i] = static_cast<std::byte>(now >> (8 * (3 - i)));
   write();
   EXPECT_EQ(stamp_of(file), 0U);
+  fs::remove_all(folder);
+}
+
+// The game moves a chunk that has grown to other sectors, also while a source has the region open.
+TEST(PartStamp, MovedChunksAreReadFromTheirNewPlace) {
+  const fs::path folder = fs::path(testing::TempDir()) / "quoin_moved_chunk";
+  fs::create_directories(folder);
+  const fs::path file = folder / "r.0.0.mca";
+  const std::vector<std::byte> region = region_with(chunk_of_stairs(0));
+  ASSERT_TRUE(write_file(region, file));
+  const auto source = open_chunk_source(file);
+  ASSERT_TRUE(source);
+  ASSERT_TRUE((*source)->part_stamp(0));  // reads the table
+  const auto write_in_place = [&](const std::vector<std::byte>& bytes) {
+    std::fstream out(file, std::ios::in | std::ios::out | std::ios::binary);
+    out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  };
+  const auto count = [&](std::size_t& broken) {
+    std::size_t voxels = 0;
+    const auto done = (*source)->visit_columns(0, kTop, [&](IVec3, VoxelType) { return ++voxels > 0; });
+    EXPECT_TRUE(done);
+    broken = done ? done->broken.size() : 0;
+    return voxels;
+  };
+  std::size_t broken = 0;
+  const std::size_t before = count(broken);
+  EXPECT_GT(before, 0U);
+  std::vector<std::byte> moved(region.size() + 4096);
+  std::copy(region.begin() + 8192, region.end(), moved.begin() + 12288);
+  moved[2] = std::byte{3};
+  moved[3] = region[3];
+  write_in_place(moved);
+  EXPECT_EQ(count(broken), before);
+  EXPECT_EQ(broken, 0U);
+  // Damage of a chunk that has not moved is reported.
+  std::vector<std::byte> damaged = moved;
+  damaged[2] = std::byte{2};
+  write_in_place(damaged);
+  EXPECT_EQ(count(broken), 0U);
+  EXPECT_EQ(broken, 1U);
   fs::remove_all(folder);
 }
 

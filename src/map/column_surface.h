@@ -20,10 +20,10 @@
 
 namespace quoin::map {
 
-/// What is seen of one column of voxels from above. Colours are square roots of linear light, as bytes.
+/// One column of voxels, seen from above. Colours are square roots of linear light, as bytes.
 struct SeenColumn {
   std::array<std::uint8_t, 3> floor{};  ///< light of the highest voxel that hides those below, as far as it is seen
-  std::array<std::uint8_t, 3> cover{};  ///< light of what is above it: water, glass, plants
+  std::array<std::uint8_t, 3> cover{};  ///< light of the voxels above it: water, glass, plants
   std::uint8_t alpha = 0;               ///< 0: nothing
   bool glows = false;                   ///< the floor emits light
   std::int32_t y = 0;                   ///< height of the surface: of a fluid, else of the floor
@@ -40,7 +40,7 @@ struct ColumnSurface {
 /// Accumulates the voxels of columns from the top down.
 class SurfaceBuilder {
  public:
-  /// `ceiling`: the columns are cut at this height, and what is solid there is skipped down to the first air.
+  /// `ceiling`: the columns are cut at this height, and solid voxels there are skipped down to the first air.
   SurfaceBuilder(TypeLooks& looks, std::optional<int> ceiling);
 
   /// Adds a voxel, the next one of its column. Returns false if nothing below it can be seen.

@@ -33,7 +33,7 @@ class MapFolder {
   [[nodiscard]] const MapLayer& layer() const { return layer_; }
   /// Returns the world and the options that the layer's tiles depend on, on one line.
   [[nodiscard]] const std::string& identity() const { return identity_; }
-  /// Writes index.html, and what it shows of this layer: state/KEY.json; then layers.js and markers.js of all layers.
+  /// Writes index.html; the data of this layer, state/KEY.json; and layers.js and markers.js with those of all layers.
   /// Errors: CannotWrite.
   [[nodiscard]] Status write_page(const ChunkSource& source, const MapLog& log) const;
 

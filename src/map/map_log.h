@@ -34,8 +34,8 @@ struct TileRecord {
   bool operator==(const TileRecord&) const = default;
 };
 
-/// What a map's folder holds: a record per tile, in a file that grows by a record with each tile that is drawn, so that
-/// an interrupted run continues where it stopped. A record that was cut off or damaged is ignored with all after it.
+/// The state of a map: a record per tile, in a file that grows by a record with each tile that is drawn, so that an
+/// interrupted run continues. A record that was cut off or damaged is ignored with all after it.
 ///
 /// Format:  a line of text, "quoin map 1" and the map's identity; then records: uint32 bytes after it, int32 z, x, y,
 ///          uint64 stamp, uint8 flags (1: has a file; 2: the tile is gone), signs, uint64 hash of all these bytes.
@@ -58,7 +58,7 @@ class MapLog {
   [[nodiscard]] Status put(TilePlace place, TileRecord record);
   /// Appends that a tile is gone. Errors: CannotWrite.
   [[nodiscard]] Status remove(TilePlace place);
-  /// Writes the log anew if most of its records are superseded. Errors: CannotWrite.
+  /// Writes a new log if later records replace most of its records. Errors: CannotWrite.
   [[nodiscard]] Status compact();
 
  private:

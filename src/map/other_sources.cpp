@@ -42,7 +42,7 @@ IBox bounds_of(const std::vector<IBox>& parts) {
   return bounds;
 }
 
-/// Returns a hash of what a map shows of all types.
+/// Returns a hash of the looks of all types.
 std::uint64_t hash_of_types(const VoxelRegistry& types) {
   std::uint64_t hash = kHashSeed;
   for (std::size_t i = 0; i < types.size(); ++i) {

@@ -14,9 +14,9 @@ namespace quoin::map {
 /// The look of a voxel type from straight above.
 struct TypeLook {
   Vec3 colour{0.0F};      ///< in linear light
-  float coverage = 1.0F;  ///< the share of the voxel's square that hides what is below, 0 to 1
-  bool is_fluid = false;  ///< what is below fades with depth
-  bool glows = false;     ///< emits light: not darkened by what is around it
+  float coverage = 1.0F;  ///< the share of the voxel's square that hides the voxels below, 0 to 1
+  bool is_fluid = false;  ///< hides the ground gradually, by its depth
+  bool glows = false;     ///< emits light: higher voxels around do not darken it
 };
 
 /// Returns the look of a type: the means of its upper faces' textures, of shapes in their default state; or its colour.

@@ -250,7 +250,8 @@ class MapDrawer {
     if (image) {
       fs::create_directories(file.parent_path(), error);
       if (error) return make_error(ErrorCode::CannotWrite, error.message(), file.parent_path().string());
-      const auto written = options_.tiles == MapTiles::WebP ? write_webp(*image, file) : write_png(*image, file);
+      const auto written =
+          options_.tiles == MapTiles::WebP ? write_webp(*image, file, WebPEffort::Quick) : write_png(*image, file);
       if (!written) return written.error();
       bytes = *written;
     } else {

@@ -368,7 +368,7 @@ TEST_F(WorldMap, WritesSignsAsTextOnly) {
   EXPECT_EQ(*read_file(folder_ / "markers.js"), bytes);
 }
 
-TEST_F(WorldMap, OfNothingHasNoTiles) {
+TEST_F(WorldMap, HasNoTilesOfEmptyWorld) {
   const auto drawn = draw(TestWorld({}, fill_hills));
   ASSERT_TRUE(drawn);
   EXPECT_EQ(drawn->tiles_written, 0U);

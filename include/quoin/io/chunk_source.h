@@ -81,7 +81,8 @@ struct VisitedColumns {
 /// Threads: every function may be called from any thread, also at once.
 /// Memory:  bounded for any world: 40 bytes per part, the parts being read, and a 32 MiB cache of recently read parts
 ///          for `read`.
-/// Files:   must not change while the source is open.
+/// Files:   must not change while the source is open, except regions of Minecraft: the game may save chunks, which are
+///          then read as they were, or as they are.
 class ChunkSource {
  public:
   ChunkSource(const ChunkSource&) = delete;

@@ -15,7 +15,7 @@
 
 namespace [[gnu::visibility("default")]] quoin {
 
-/// The zoom of a map at which a pixel is a voxel; each lower one halves its size.
+/// The highest zoom of a map, where a pixel is a voxel. Each lower one halves its size.
 inline constexpr int kMapZoom = 18;
 
 /// The file format of a map's tiles. Both are lossless.
@@ -39,8 +39,8 @@ struct DrawnMap {
   std::vector<std::string> warnings{};
 };
 
-/// Opens a world to draw: of Minecraft or Luanti, as open_chunk_source; a .quoin world, of which the grid with the most
-/// chunks is drawn; or any other file with voxels, whose scene is loaded whole (load_scene).
+/// Opens a world to draw: of Minecraft or Luanti, as open_chunk_source; the grid with the most chunks of a .quoin world;
+/// or the scene of any other file with voxels, which is loaded whole (load_scene).
 ///
 /// Errors: those of open_chunk_source, WorldStore and load_scene.
 [[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_map_source(const std::filesystem::path& path,
@@ -55,8 +55,8 @@ struct DrawnMap {
 ///
 /// Tiles:   FOLDER/tiles/Z/X/Y.webp, of 256 x 256 pixels. At zoom kMapZoom the pixel (0, 0) of tile (0, 0) is the
 ///          column of voxels at x = 0, z = 0; x grows to the right (east), z downwards (south). Four tiles of zoom
-///          Z + 1 make one of zoom Z, down to the zoom at which tiles -1 and 0 cover the world. Dimensions other than
-///          the overworld are in FOLDER/tiles/NAME.
+///          Z + 1 make one of zoom Z, until tiles -1 and 0 cover the world. Dimensions other than the overworld are in
+///          FOLDER/tiles/NAME.
 /// Look:    the mean colours of the types' upper faces, darkened by relief (light from the north-west), by higher
 ///          ground around (the share of the sky that is seen), and in water by depth.
 /// Updates: FOLDER/state has a stamp of each tile's sources. Tiles whose sources have not changed are kept, and those

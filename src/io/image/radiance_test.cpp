@@ -196,6 +196,26 @@ Image stripes() {
   return image;
 }
 
+TEST(WebPImages, KeepAllPixelsAtAnyEffort) {
+  if (!has_webp()) GTEST_SKIP() << "built without libwebp";
+  AlphaImage image{33, 21, {}};
+  for (int i = 0; i < 33 * 21 * 4; ++i) image.rgba.push_back(static_cast<std::uint8_t>(i * i / 7 + i / 50));
+  const auto quick = write_webp(image, WebPEffort::Quick);
+  ASSERT_TRUE(quick);
+  EXPECT_EQ(*quick, *write_webp(image, WebPEffort::Quick));
+  const auto read = read_alpha_image(*quick);
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->width, 33);
+  EXPECT_EQ(read->rgba, image.rgba) << "also where alpha is 0";
+  const auto small = read_alpha_image(*write_webp(image, WebPEffort::Small));
+  ASSERT_TRUE(small);
+  for (std::size_t i = 0; i < image.rgba.size(); i += 4) {
+    if (image.rgba[i + 3] == 0) continue;
+    EXPECT_TRUE(std::equal(&image.rgba[i], &image.rgba[i] + 4, &small->rgba[i])) << i;
+  }
+  EXPECT_FALSE(write_webp(AlphaImage{2, 2, {}}, WebPEffort::Quick));
+}
+
 TEST(LossyImages, AreDeterministicAndRejectInvalidInput) {
   if (!has_jpeg() || !has_webp()) GTEST_SKIP() << "built without libjpeg or libwebp";
   const Image image = stripes();

@@ -223,7 +223,7 @@ class MinecraftSource final : public ChunkSource {
       located.byte_offset = file.offset(chunk.x, chunk.z);
       broken.push_back(std::move(located));
     };
-    const auto bytes = file.read(chunk.x, chunk.z);
+    const auto bytes = read_bytes(file, name, chunk);
     if (!bytes) {
       broken.push_back(bytes.error());
       return {};
@@ -240,6 +240,16 @@ class MinecraftSource final : public ChunkSource {
       return {};
     }
     return used;
+  }
+
+  /// Reads a chunk. The game may have moved it since the region's table was read: then reads it by the present table.
+  static Result<std::vector<std::byte>> read_bytes(const RegionFile& file, RegionName name, IVec3 chunk) {
+    auto bytes = file.read(chunk.x, chunk.z);
+    if (bytes || file.path().empty() || file.is_expanded_whole()) return bytes;
+    const auto present = RegionFile::open(file.path(), name);
+    const bool has_moved = present && (*present)->has(chunk.x, chunk.z) &&
+                           (*present)->stamp(chunk.x, chunk.z) != file.stamp(chunk.x, chunk.z);
+    return has_moved ? (*present)->read(chunk.x, chunk.z) : bytes;
   }
 
   static IVec3 corner_of(IVec3 place, const Section& section) {

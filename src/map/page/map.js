@@ -1,8 +1,7 @@
 'use strict';
 // Shows the tiles of a folder that `quoin map` wrote. Works opened as a file: all data comes from scripts and images.
 (function () {
-  // The zoom at which a pixel is a voxel (kMapZoom in world_map.h). Leaflet counts from there, so that lower ones are
-  // negative.
+  // Pixels are voxels at this zoom (kMapZoom in world_map.h). Leaflet counts from there: lower ones are negative.
   const lastZoom = 18;
   const closest = 4;
   const transparent = 'data:image/gif;base64,R0lGODlhAQABAIAAAAAAAP///yH5BAEAAAAALAAAAAABAAEAAAIBRAA7';
@@ -92,7 +91,8 @@
   function writeAddress() {
     if (!current) return;
     const at = map.getCenter();
-    const address = '#' + [encodeURIComponent(current.key), map.getZoom(), Math.floor(at.lng), Math.floor(at.lat)].join('/');
+    const place = [map.getZoom(), Math.floor(at.lng), Math.floor(at.lat)];
+    const address = '#' + [encodeURIComponent(current.key), ...place].join('/');
     if (address === location.hash) return;
     try {
       history.replaceState(null, '', address);

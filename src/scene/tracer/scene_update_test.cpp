@@ -60,7 +60,7 @@ TEST(SceneUpdate, UpdatedTracerMatchesNewTracer) {
 // Two tracers take turns with snapshots. A snapshot ends when its tracer goes over to a later one.
 TEST(SceneUpdate, TracerOfNextSnapshotMatchesNewTracer) {
   TracerCounts counts;
-  for (unsigned seed = 0; seed < static_cast<unsigned>(cases(8, 40)); ++seed) {
+  for (unsigned seed = 0; seed < static_cast<unsigned>(cases(10, 40)); ++seed) {
     SCOPED_TRACE(seed);
     ChangingScene world(seed, true);
     std::array<std::unique_ptr<Scene>, 2> scenes;
@@ -108,7 +108,7 @@ struct TwoCubes {
 
 TEST(SceneUpdate, ShapesFollowEditsStatesAndTypes) {
   TracerCounts counts;
-  for (unsigned seed = 0; seed < static_cast<unsigned>(cases(3, 40)); ++seed) {
+  for (unsigned seed = 0; seed < static_cast<unsigned>(cases(4, 40)); ++seed) {
     SCOPED_TRACE(seed);
     ChangingScene world(seed, false, true);
     SceneTracer tracer(world.scene, InstanceFilter::Visible, {1});
