@@ -33,6 +33,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/density/density_storage.h", {"mesh", "store", "trace"}},
     {"grid/shapes/shape_index.h", {"map", "render", "scene"}},
     {"io/format_driver.h", {"store"}},
+    {"io/placed_grids.h", {"map"}},
     {"io/scene_file/scene_parts.h", {"store"}},
     {"scene/surfaces.h", {"io", "render"}},
     {"scene/frustum.h", {"render"}},
@@ -54,7 +55,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
 };
 
 // Pairs of a lent header and its user. Lower it when a pair goes; a higher number needs a reason in docs/decisions.
-constexpr std::size_t kMaxLoans = 37;
+constexpr std::size_t kMaxLoans = 38;
 
 // A file with fewer lines needs a reason, because compile time and a reader's way are paid per file.
 constexpr int kSmallFile = 60;

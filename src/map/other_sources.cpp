@@ -1,10 +1,8 @@
 #include "map/other_sources.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
-#include <limits>
-#include <map>
+#include <iterator>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -12,10 +10,11 @@
 
 #include <quoin/core/assert.h>
 #include <quoin/core/thousands.h>
-#include <quoin/grid/copy_box.h>
 #include <quoin/map/world_map.h>
 
+#include "core/bytes/files.h"
 #include "core/rows/packed_row.h"
+#include "io/placed_grids.h"
 
 namespace quoin::map {
 
@@ -163,37 +162,24 @@ Result<std::unique_ptr<ChunkSource>> source_of_world(WorldStore world) {
       new WorldSource(std::move(info), std::move(parts), std::move(*types), std::move(world), chosen));
 }
 
-std::unique_ptr<ChunkSource> source_of_scene(LoadedScene loaded, const fs::path& path) {
-  const Scene& scene = loaded.scene;
-  Grid merged;
-  std::size_t left_out = 0;
-  for (const InstanceHandle handle : scene.instances().handles()) {
-    const Instance& instance = scene.instances()[handle];
-    const Grid& grid = scene.grids()[instance.grid].grid;
-    if (grid.bounds().empty()) continue;
-    constexpr double kNear = 1e-6;
-    const DVec3 position = instance.position - scene.grids()[instance.grid].pivot;
-    const IVec3 to(glm::round(position));
-    const bool is_whole = glm::length(position - DVec3(to)) < kNear && std::abs(instance.voxel_size - 1.0) < kNear &&
-                          std::abs(std::abs(instance.rotation.w) - 1.0) < kNear && instance.group == GroupHandle();
-    if (!is_whole) {
-      ++left_out;
-      continue;
-    }
-    const IBox box = grid.bounds();
-    copy_box(grid, box, merged, box.min + to, {}, {.copy_air = false});
-  }
+Result<std::unique_ptr<ChunkSource>> source_of_scene(LoadedScene loaded, const fs::path& path) {
+  auto merged = models::merge_grids(loaded.scene, {.extension = "maps",
+                                                   .names = true,
+                                                   .several = true,
+                                                   .transparency = true,
+                                                   .materials = true,
+                                                   .type_names = true,
+                                                   .place_in_units = true});
+  if (!merged) return with_path(Result<std::unique_ptr<ChunkSource>>(merged.error()), path);
   ChunkSourceInfo info;
   info.format = loaded.format;
   info.name = path.stem().string();
   info.warnings = std::move(loaded.warnings);
-  if (left_out > 0) {
-    info.warnings.push_back("the map leaves out " + with_thousands(static_cast<std::int64_t>(left_out)) +
-                            " models that are turned, scaled or not at whole voxels");
-  }
-  std::vector<IBox> parts = columns_of(merged.chunks());
+  std::ranges::move(merged->warnings, std::back_inserter(info.warnings));
+  std::vector<IBox> parts = columns_of(merged->voxels.chunks());
   info.chunks = bounds_of(parts);
-  return std::make_unique<SceneSource>(std::move(info), std::move(parts), scene.types, std::move(merged));
+  return std::unique_ptr<ChunkSource>(
+      new SceneSource(std::move(info), std::move(parts), loaded.scene.types, std::move(merged->voxels)));
 }
 
 }  // namespace quoin::map

@@ -17,8 +17,10 @@ namespace quoin::map {
 /// Returns the grid of a world on disk with the most chunks. Warns of other grids. Errors: those of WorldStore.
 [[nodiscard]] Result<std::unique_ptr<ChunkSource>> source_of_world(WorldStore world);
 
-/// Returns the voxels of a scene. Instances that are turned, scaled or not at whole voxels are left out, with a
-/// warning. Where instances overlap, the last one counts. Memory: the voxels of all instances.
-[[nodiscard]] std::unique_ptr<ChunkSource> source_of_scene(LoadedScene loaded, const std::filesystem::path& path);
+/// Returns the voxels of a scene. Where instances overlap, the last one counts. Memory: the voxels of all instances.
+/// Errors: Unsupported for density fields, rotations that are not multiples of 90 degrees, and voxels of different
+/// sizes.
+[[nodiscard]] Result<std::unique_ptr<ChunkSource>> source_of_scene(LoadedScene loaded,
+                                                                   const std::filesystem::path& path);
 
 }  // namespace quoin::map

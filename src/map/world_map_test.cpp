@@ -6,13 +6,16 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <numbers>
 #include <set>
 #include <string>
 #include <vector>
 
+#include <glm/gtc/quaternion.hpp>
 #include <gtest/gtest.h>
 
 #include <quoin/io/file.h>
+#include <quoin/io/formats.h>
 #include <quoin/io/image_files.h>
 
 #include "map/column_surface.h"
@@ -373,6 +376,63 @@ TEST_F(WorldMap, HasNoTilesOfEmptyWorld) {
   ASSERT_TRUE(drawn);
   EXPECT_EQ(drawn->tiles_written, 0U);
   EXPECT_TRUE(tiles_in(folder_).empty());
+}
+
+// ---- other sources ----
+
+// A flat field with a turned bar on it, and a lamp far away.
+Scene small_scene() {
+  Scene scene;
+  scene.types = types_of_test();
+  SceneGrid field;
+  field.grid.fill_box({{0, 0, 0}, {100, 4, 100}}, kGround);
+  field.grid.set({90, 4, 300}, kLamp);
+  scene.add_instance({.grid = scene.add_grid(std::move(field))});
+  SceneGrid bar;
+  bar.grid.fill_box({{0, 0, 0}, {20, 2, 1}}, kRoof);
+  Instance turned;
+  turned.grid = scene.add_grid(std::move(bar));
+  turned.position = {10.0, 4.0, 60.0};
+  turned.rotation = glm::angleAxis(std::numbers::pi / 2.0, DVec3(0.0, 1.0, 0.0));  // along -z
+  scene.add_instance(turned);
+  return scene;
+}
+
+TEST_F(WorldMap, DrawsScenesAndWorldsOnDisk) {
+  const Scene scene = small_scene();
+  fs::create_directories(folder_);
+  for (const char* const name : {"scene.json", "world.quoin"}) {
+    const fs::path file = folder_ / name;
+    ASSERT_TRUE(save_scene(scene, file)) << name;
+    const auto source = open_map_source(file);
+    ASSERT_TRUE(source) << to_string(source.error());
+    const fs::path out = folder_ / (std::string(name) + "_map");
+    const auto drawn = draw_map(**source, out, {.tiles = MapTiles::Png});
+    ASSERT_TRUE(drawn) << to_string(drawn.error());
+    EXPECT_GT(drawn->tiles_written, 2U);
+    const auto image = read_alpha_image(out / "tiles/18/0/0.png");
+    ASSERT_TRUE(image);
+    EXPECT_EQ(pixel(*image, 50, 50), (std::array{120, 150, 90, 255})) << name;
+    EXPECT_EQ(read_alpha_image(out / "tiles/18/0/1.png").has_value(), true);
+    // A world shows its largest grid, a scene all of them.
+    const bool has_bar = pixel(*image, 10, 50)[0] < 60;
+    EXPECT_EQ(has_bar, std::string(name) == "scene.json");
+    const auto again = draw_map(**open_map_source(file), out, {.tiles = MapTiles::Png});
+    ASSERT_TRUE(again);
+    EXPECT_EQ(again->tiles_written, 0U) << name;
+  }
+}
+
+TEST_F(WorldMap, RefusesScenesWithoutLattice) {
+  Scene scene = small_scene();
+  const InstanceHandle last = scene.instances().handles().back();
+  scene.edit(last).rotation = glm::angleAxis(0.3, DVec3(0.0, 1.0, 0.0));
+  fs::create_directories(folder_);
+  ASSERT_TRUE(save_scene(scene, folder_ / "scene.json"));
+  const auto source = open_map_source(folder_ / "scene.json");
+  ASSERT_FALSE(source);
+  EXPECT_EQ(source.error().code, ErrorCode::Unsupported);
+  EXPECT_FALSE(open_map_source(folder_ / "missing.vox"));
 }
 
 // ---- looks ----

@@ -42,7 +42,8 @@ struct DrawnMap {
 /// Opens a world to draw: of Minecraft or Luanti, as open_chunk_source; the grid with the most chunks of a .quoin world;
 /// or the scene of any other file with voxels, which is loaded whole (load_scene).
 ///
-/// Errors: those of open_chunk_source, WorldStore and load_scene.
+/// Errors: those of open_chunk_source, WorldStore and load_scene; Unsupported for scenes with density fields, voxels of
+///         different sizes, or rotations other than by multiples of 90 degrees.
 [[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_map_source(const std::filesystem::path& path,
                                                                    const LoadOptions& options = {},
                                                                    Threads threads = {}, const Progress& progress = {});
@@ -59,9 +60,9 @@ struct DrawnMap {
 ///          FOLDER/tiles/NAME.
 /// Look:    the mean colours of the types' upper faces, darkened by relief (light from the north-west), by higher
 ///          ground around (the share of the sky that is seen), and in water by depth.
-/// Updates: FOLDER/state has a stamp of each tile's sources. Tiles whose sources have not changed are kept, and those
-///          of deleted chunks are removed. A run that was interrupted, also by a power cut, continues. Files appear
-///          whole or not at all.
+/// Updates: FOLDER/state has a stamp of each tile's sources. Tiles with unchanged sources are kept, and those without
+///          chunks are removed. A run that was interrupted, also by a power cut, continues. Files appear whole or not
+///          at all.
 /// Live:    the world may be saved meanwhile; a chunk that is being written is drawn by the next run.
 /// Damage:  an unreadable chunk is a hole in the map; warnings name and count them.
 /// Order:   the same world gives the same files, on any number of threads and however it was interrupted.
