@@ -122,6 +122,9 @@ Json layer_of(const ChunkSource& source, const MapLayer& layer, const MapLog& lo
   json["zooms"] = {first_zoom, kMapZoom};
   json["bounds"] = {std::int64_t{x0} * kTileEdge, std::int64_t{z0} * kTileEdge, std::int64_t{x1} * kTileEdge,
                     std::int64_t{z1} * kTileEdge};
+  const IBox& chunks = info.chunks;
+  json["content"] = {std::int64_t{chunks.min.x} * kChunkEdge, std::int64_t{chunks.min.z} * kChunkEdge,
+                     std::int64_t{chunks.max.x} * kChunkEdge, std::int64_t{chunks.max.z} * kChunkEdge};
   if (info.spawn) json["spawn"] = {info.spawn->x, info.spawn->y, info.spawn->z};
   return json;
 }

@@ -27,8 +27,7 @@
     element('dark').textContent = dark ? 'Light' : 'Dark';
   }
 
-  function boundsOf(layer) {
-    const [x0, z0, x1, z1] = layer.bounds;
+  function boundsOf([x0, z0, x1, z1]) {
     return L.latLngBounds([z0, x0], [z1, x1]);
   }
 
@@ -57,7 +56,7 @@
     current = layer;
     document.title = layer.world ? layer.world + ' – map' : 'Map';
     shown = L.tileLayer(layer.tiles + '/{z}/{x}/{y}.' + layer.extension, {
-      bounds: boundsOf(layer),
+      bounds: boundsOf(layer.bounds),
       minNativeZoom: layer.zooms[0] - lastZoom,
       maxNativeZoom: 0,
       minZoom: -lastZoom,
@@ -67,13 +66,13 @@
       noWrap: true,
     }).addTo(map);
     map.setMinZoom(layer.zooms[0] - lastZoom - 2);
-    map.setMaxBounds(boundsOf(layer).pad(1));
+    map.setMaxBounds(boundsOf(layer.bounds).pad(1));
     if (view) {
       map.setView([view.z, view.x], view.zoom, {animate: false});
     } else if (layer.spawn) {
       map.setView([layer.spawn[2], layer.spawn[0]], 0, {animate: false});
     } else {
-      map.fitBounds(boundsOf(layer), {animate: false, maxZoom: 1});
+      map.fitBounds(boundsOf(layer.content), {animate: false, maxZoom: 2});
     }
     element('layers').value = layer.key;
     addMarkers(layer);
