@@ -38,6 +38,7 @@ std::uint64_t hash_of(const VoxelProperties& p) {
     const std::uint64_t rest =
         tint * 32 + static_cast<std::uint64_t>(face.alpha) * 8 + std::uint64_t{face.turn} * 2 + (face.mirrored ? 1 : 0);
     hash = mixed_with(mixed_with(hash, face.texture.hash()), rest);
+    if (face.emission_share != 255) hash = mixed_with(hash, face.emission_share);
   }
   return hash;
 }

@@ -156,13 +156,13 @@ namespace {
 bool comes_before(const VoxelProperties& a, const VoxelProperties& b) {
   const auto key = [](const VoxelProperties& p) {
     const std::array colour{p.colour.r, p.colour.g, p.colour.b, p.colour.a};
-    std::array<std::tuple<std::uint64_t, int, bool, FaceAlpha, std::array<std::uint8_t, 4>>, 6> faces{};
+    std::array<std::tuple<std::uint64_t, int, bool, FaceAlpha, std::array<std::uint8_t, 5>>, 6> faces{};
     for (const Direction direction : kDirections) {
       if (p.faces.empty()) break;
       const VoxelFace& face = p.faces[direction];
       const Rgba8 tint = face.tint;
       faces[static_cast<std::size_t>(direction)] = {face.texture.hash(), face.turn, face.mirrored, face.alpha,
-                                                    std::array{tint.r, tint.g, tint.b, tint.a}};
+                                                    std::array{tint.r, tint.g, tint.b, tint.a, face.emission_share}};
     }
     const std::tuple rest(colour, p.visibility, p.collides, p.state_bits, p.emission, p.roughness, p.metalness, p.ior,
                           p.scattering, p.anisotropy, p.blocks_light, p.occludes, p.light_cost, p.remesh_on_data,

@@ -165,7 +165,7 @@ MaterialPalette::TexturedLook MaterialPalette::textured_look(const MeshView& vie
   }
   look.roughness = unit(type.roughness, 1.0F);
   look.metalness = unit(type.metalness, 0.0F);
-  look.emission = emits(view.surface) ? clamped_emission(type.emission) : 0.0F;
+  look.emission = emits(view.surface) ? clamped_emission(type.emission) * emission_factor(face) : 0.0F;
   return look;
 }
 
@@ -305,6 +305,7 @@ SurfaceMaterial MaterialPalette::smooth_material_of(const SmoothLook& look) cons
   material.roughness = std::clamp(look.roughness, 0.0F, 1.0F);
   material.metalness = std::clamp(look.metalness, 0.0F, 1.0F);
   const VoxelProperties& properties = types_[look.type];
+  // Textures are projected along three axes, so no share of a face (VoxelFace::emission_share) fits a triangle.
   const float emission = look.type == kAir ? 0.0F : clamped_emission(properties.emission);
   if (!(emission > 0.0F)) return material;
   material.surface = look.is_transparent ? SurfaceClass::EmissiveTransparent : SurfaceClass::Emissive;

@@ -7,6 +7,7 @@
 #include <span>
 
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 
 #include <quoin/core/assert.h>
 
@@ -43,7 +44,8 @@ Surface surface_of(const VoxelProperties& properties, Clouds clouds) {
   Surface surface;
   const Rgba8 c = properties.colour;
   surface.colour = linear_colour(c);
-  surface.emitted = surface.colour * emission_of(properties);
+  surface.emission = emission_of(properties);
+  surface.emitted = surface.colour * surface.emission;
   surface.roughness = properties.roughness >= 0.0F ? std::min(properties.roughness, 1.0F) : 1.0F;
   surface.metalness = properties.metalness >= 0.0F ? std::min(properties.metalness, 1.0F) : 0.0F;
   if (properties.visibility != Visibility::Transparent) return surface;
@@ -154,33 +156,46 @@ FaceTexels face_texels(const VoxelFace& face, Direction direction, float emissio
   }
   found.linear = linear_bytes().data();
   found.tint = linear_colour(face.tint);
-  found.emission = emission;
+  found.emission = emission * emission_factor(face);
   return found;
 }
 
-Vec3 triplanar_colour(const TypeFaces& faces, const FieldPoint& point) {
+bool is_lamp_side(const ModelFace& side, const VoxelFace* look, const VoxelProperties& type) {
+  if (side.is_inner || !(emission_of(type) > 0.0F) || (look != nullptr && look->emission_share == 0)) return false;
+  const bool has_texels = look != nullptr && !look->texture.is_null();
+  if (type.visibility != Visibility::Opaque && (!has_texels || look->alpha == FaceAlpha::Translucent)) return false;
+  constexpr float kRounding = 1e-4F;
+  const auto& at = side.corners;
+  const Vec3 u = at[1] - at[0];
+  const Vec3 v = at[3] - at[0];
+  const float size_u = glm::length(u);
+  const float size_v = glm::length(v);
+  return size_u > 0.0F && size_v > 0.0F && glm::length(at[2] - at[1] - v) < kRounding &&
+         std::abs(glm::dot(u, v)) < kRounding * size_u * size_v;
+}
+
+void show_triplanar(const TypeFaces& faces, const FieldPoint& point, Surface& surface) {
   const Vec3& n = point.normal;
   const std::array<float, 3> weights = faces.on_fields.weights(n);
   const double scale = faces.on_fields.textures_per_voxel;
   const DVec3 position = point.position * scale;
   const DVec3 inside = position - glm::floor(position);
   const double square = point.square_spacing * scale * scale;
-  Vec3 colour(0.0F);
+  surface.colour = surface.emitted = Vec3(0.0F);
   for (int axis = 0; axis < 3; ++axis) {
     const float weight = weights[static_cast<std::size_t>(axis)];
     if (!(weight > 0.0F)) continue;
     const FaceTexels& side = faces.sides[static_cast<std::size_t>(2 * axis + (n[axis] < 0.0F ? 1 : 0))];
-    colour += weight * side.colour(side.texel(inside, IVec3(0), mipmap_level(square, side.log_size)));
+    const Vec3 colour = weight * side.colour(side.texel(inside, IVec3(0), mipmap_level(square, side.log_size)));
+    surface.colour += colour;
+    surface.emitted += colour * side.emission;
   }
-  return colour;
 }
 
 Surface Surfaces::field_surface(VoxelType material, const FieldPoint* point) const {
   Surface surface = of_field(material);
   const TypeFaces* const textured = point == nullptr ? nullptr : faces(material);
-  if (textured == nullptr) return surface;
-  surface.colour = triplanar_colour(*textured, *point);
-  surface.emitted = surface.colour * textured->sides[0].emission;
+  if (textured != nullptr) show_triplanar(*textured, *point, surface);
   return surface;
 }
 
@@ -213,7 +228,10 @@ void Surfaces::put(VoxelType type, const VoxelProperties& properties) {
   QUOIN_ASSERT(type + std::size_t{1} < surfaces_.size(), "a registered type");
   surfaces_[type] = surface_of(properties, clouds_);
   is_opaque_[type] = properties.visibility == Visibility::Opaque ? 1 : 0;
-  if (!properties.shapes.empty()) shape_means_[type] = quoin::mean_of_shapes(properties);
+  if (!properties.shapes.empty()) {
+    const float emission = surfaces_[type].emission * emission_share_of_shapes(properties);
+    shape_means_[type] = glm::vec4(quoin::mean_of_shapes(properties), emission);
+  }
   if (faces_.empty()) return;
   faces_[type] = nullptr;
   if (properties.faces.empty()) return;

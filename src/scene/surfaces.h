@@ -11,6 +11,7 @@
 #include <vector>
 
 #include <glm/gtc/type_ptr.hpp>
+#include <glm/vec4.hpp>
 
 #include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
@@ -28,7 +29,8 @@ class ShapeIndex;
 /// The shading properties of a voxel type, in linear light.
 struct Surface {
   Vec3 colour{0.0F};
-  Vec3 emitted{0.0F};  ///< colour * emission
+  Vec3 emitted{0.0F};     ///< colour * emission
+  float emission = 0.0F;  ///< of the type (emission_of); textured faces and shapes have shares of it
   /// Natural logarithms of the transmittance per voxel length: per channel, and for the share that passes without tint.
   /// 0 if clear; minus infinity if opaque.
   Vec3 log_transmittance{0.0F};
@@ -84,7 +86,7 @@ struct FaceTexels {
   std::array<double, 2> scale{};       ///< texels of level 0 per voxel along the axis, negative against it
   std::array<double, 2> offset{};      ///< texels from the texture's edge to the voxel's lower side
   std::uint32_t last = 0;              ///< the last row and column of level 0
-  float emission = 0.0F;
+  float emission = 0.0F;               ///< the face's share of the type's
   Vec3 tint{1.0F};
 
   /// Returns the texel that `texel_at` returns for a position on the face, in the grid. `level`: 0 to `log_size`.
@@ -127,8 +129,12 @@ struct FaceTexels {
 /// texture, the tint.
 [[nodiscard]] Vec3 mean_colour(const VoxelFace& face);
 
-/// Prepares a face. Lifetime: that of its texture. Requires: the face has one.
+/// Prepares a face. `emission`: of the type. Lifetime: that of its texture. Requires: the face has one.
 [[nodiscard]] FaceTexels face_texels(const VoxelFace& face, Direction direction, float emission);
+
+/// Returns true if path tracing samples a side of a shape as a lamp: it emits, rays end at it, and it is a visible
+/// rectangle. `look`: of the side (look_of).
+[[nodiscard]] bool is_lamp_side(const ModelFace& side, const VoxelFace* look, const VoxelProperties& type);
 
 /// The textured faces of a type.
 struct TypeFaces {
@@ -145,8 +151,9 @@ struct FieldPoint {
   double square_spacing = 0.0;  ///< of the image's samples, in voxels; 0: level 0 of the mipmaps
 };
 
-/// Returns the colour of a material at a point: its textures along the three axes, weighted by the normal.
-[[nodiscard]] Vec3 triplanar_colour(const TypeFaces& faces, const FieldPoint& point);
+/// Sets the colour and emission of a material at a point: those of its textures along the three axes, weighted by the
+/// normal.
+void show_triplanar(const TypeFaces& faces, const FieldPoint& point, Surface& surface);
 
 /// Surfaces by type. Unregistered ids give a conspicuous magenta.
 class Surfaces {
@@ -169,7 +176,12 @@ class Surfaces {
   /// Returns the mean colour of a type's shapes, for cells of halved grids. Requires: the type has shapes.
   [[nodiscard]] Vec3 mean_of_shapes(VoxelType type) const {
     QUOIN_ASSERT(type < shape_means_.size(), "a type with shapes");
-    return shape_means_[type];
+    return Vec3(shape_means_[type]);
+  }
+  /// Returns the emission of these cells, as a multiple of their colour. Requires: the type has shapes.
+  [[nodiscard]] float emission_of_shapes(VoxelType type) const {
+    QUOIN_ASSERT(type < shape_means_.size(), "a type with shapes");
+    return shape_means_[type].w;
   }
   /// Returns `faces` of all types; empty without textures.
   [[nodiscard]] std::span<const std::shared_ptr<const TypeFaces>> all_faces() const { return faces_; }
@@ -216,8 +228,8 @@ class Surfaces {
   bool has_textures_ = false;
   bool has_textured_glass_ = false;
   bool has_cells_of_faces_ = false;
-  std::vector<Vec3> shape_means_;  // empty without shapes
-  std::vector<VoxelType> fluids_;  // see `fluid`; empty without fluids
+  std::vector<glm::vec4> shape_means_;  // colour, emission; empty without shapes
+  std::vector<VoxelType> fluids_;       // see `fluid`; empty without fluids
 };
 
 /// The way of a ray through a cell, or through a block of cells of one type.

@@ -135,9 +135,16 @@ struct VoxelFace {
   bool mirrored = false;      ///< exchanges left and right, before the turn
   Rgba8 tint{255, 255, 255};  ///< sRGB; multiplies the texture in linear light; its alpha has no effect
   FaceAlpha alpha = FaceAlpha::Opaque;
+  /// Share of the type's emission (VoxelProperties::emission) that the face has, in 255ths: 0 none, 255 all.
+  std::uint8_t emission_share = 255;
 
   bool operator==(const VoxelFace&) const = default;
 };
+
+/// Returns VoxelFace::emission_share as a factor, 0 to 1.
+[[nodiscard]] inline float emission_factor(const VoxelFace& face) {
+  return static_cast<float>(face.emission_share) / 255.0F;
+}
 
 /// The six textured faces of a voxel type, or none. Copies share them.
 class VoxelFaces {

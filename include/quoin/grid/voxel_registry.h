@@ -98,7 +98,9 @@ struct VoxelProperties {
   bool collides = true;    ///< true if it stops moving bodies
   float roughness = 1.0F;  ///< glTF's perceptual roughness, 0 to 1
   float metalness = 0.0F;  ///< 0 to 1
-  float emission = 0.0F;   ///< radiance emitted, as a multiple of `colour` in linear light; 0 is none
+  /// Radiance emitted, as a multiple of the colour in linear light; 0 is none. Each face has a share of it
+  /// (VoxelFace::emission_share), by default all. Propagated light goes by the type alone, as in block games.
+  float emission = 0.0F;
   float ior = 1.5F;        ///< index of refraction, used by transparent types
   /// Mean number of scattering events per voxel length in path tracing, for transparent media such as clouds. `colour`
   /// is then the albedo: the fraction of light that each event keeps. 0: glass.

@@ -89,13 +89,16 @@ class BlockyMesher {
   std::unique_ptr<Scratch> scratch_;
 };
 
-/// Material class of a triangle, from its type's visibility and emission. Each class becomes a separate primitive in
-/// mesh files.
+/// Material class of a triangle, from its type's visibility and its face's emission. Each class becomes a separate
+/// primitive in mesh files.
 enum class SurfaceClass : std::uint8_t { Opaque, Transparent, Emissive, EmissiveTransparent };
 inline constexpr std::size_t kSurfaceClasses = 4;
 /// Returns the class of the triangles of a type. Transparent: its visibility is Transparent; Air and Opaque count as
 /// opaque. Emissive: its emission exceeds 0; NaN does not. Any properties are valid.
 [[nodiscard]] SurfaceClass surface_class(const VoxelProperties& properties);
+/// Returns the class of a face of the type: as above, but a face without a share of the emission
+/// (VoxelFace::emission_share) does not emit. `look`: null if the face has the type's colour.
+[[nodiscard]] SurfaceClass surface_class(const VoxelProperties& properties, const VoxelFace* look);
 
 /// The look of a vertex of a shape's face, or of a cube's that its state turns.
 struct VertexLook {

@@ -10,7 +10,7 @@
 namespace [[gnu::visibility("default")]] quoin {
 
 /// Bakes propagated light (LightModel::Propagated) into each vertex of a scene's meshes, so that mesh files show it.
-/// Fills MeshView::light with light, exposure and the type's emission, 16 bits per channel, at most 1. Vertices of
+/// Fills MeshView::light with light, exposure and the face's emission, 16 bits per channel, at most 1. Vertices of
 /// blocks get the light at their face's corners; smooth vertices get the light in front of them. The colours of the
 /// light are those of `environment_of(scene)`.
 ///

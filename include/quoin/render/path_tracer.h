@@ -68,7 +68,7 @@ struct PathImage {
 /// Fog, clouds: light scatters any number of times in Environment::fog and in transparent types with
 ///              VoxelProperties::scattering.
 /// Lamps:       emissive faces and Scene::lamps are sampled with a light tree. Emissive fields and glass are hit only
-///              by chance.
+///              by chance. The emissive sides of a shape together light other surfaces as a whole voxel does.
 ///
 /// Lifetime: as CpuRenderer.
 class PathTracer {

@@ -449,6 +449,7 @@ VoxelRegistry types_of_halved(const VoxelRegistry& types) {
     VoxelProperties cube = types[type];
     const std::uint8_t alpha = cube.colour.a;
     cube.colour = srgb_colour(mean_of_shapes(cube));
+    cube.emission *= emission_share_of_shapes(cube);
     const bool is_glass = has_glass_parts(cube);
     cube.visibility = is_glass ? Visibility::Transparent : Visibility::Opaque;
     cube.colour.a = is_glass ? alpha : 255;

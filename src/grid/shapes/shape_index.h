@@ -173,6 +173,14 @@ class ShapesAtVoxel {
 // light. Cutout sides count by their visible texels. Requires: the type has shapes.
 [[nodiscard]] Vec3 mean_of_shapes(const VoxelProperties& type);
 
+// Returns the mean share of a type's emission that these sides have (VoxelFace::emission_share), 0 to 1, with the same
+// weights. Requires: the type has shapes.
+[[nodiscard]] float emission_share_of_shapes(const VoxelProperties& type);
+
+// Returns the colour that a type's shapes emit, as a multiple of the type's emission: the mean of the emitting sides,
+// times the greatest share. Requires: the type has shapes.
+[[nodiscard]] Vec3 glow_of_shapes(const VoxelProperties& type);
+
 // The shaped voxels of a grid, by the voxels that they touch: a shape may reach outside its own voxel. Chunks without
 // shapes take no memory; a copy shares all chunks with the original until either is updated.
 //

@@ -188,6 +188,7 @@ std::uint64_t hash_of(const ShapeModel& model) {
     mix(look.texture.is_null() ? 0 : look.texture.hash());
     mix(std::uint64_t{look.turn} << 40 | std::uint64_t{look.mirrored} << 48 |
         static_cast<std::uint64_t>(look.alpha) << 56 | std::uint64_t{std::bit_cast<std::uint32_t>(look.tint)});
+    if (look.emission_share != 255) mix(look.emission_share);
   }
   return hash;
 }

@@ -276,23 +276,19 @@ Vec3 coverage_of(const ShapeModel& model, const VoxelFaces& type_faces) {
   return glm::min(seen, Vec3(1.0F));
 }
 
-Vec3 mean_of_shapes(const VoxelProperties& type) {
-  Vec3 sum(0.0F);
-  float weight = 0.0F;
-  const auto add = [&](const ElementFace& face, Direction side, float area) {
-    if (!face.is_drawn) return;
-    const VoxelFace* const look = face.face ? &*face.face : type.faces.empty() ? nullptr : &type.faces[side];
-    Vec3 colour = linear_colour(look == nullptr ? type.colour : look->tint);
-    if (look != nullptr && !look->texture.is_null()) colour *= look->texture.mean();
-    const float share = area * visible_share(look);
-    sum += share * colour;
-    weight += share;
-  };
+namespace {
+
+// Calls `visit` for each drawn side of all shapes of a type, with its look, null if it has the type's colour, and its
+// weight: the visible area, by the share of positions.
+void for_each_side(const VoxelProperties& type, FunctionRef<void(const VoxelFace* look, float weight)> visit) {
   const auto add_element = [&](const ShapeElement& element, float number) {
     const Vec3 size = element.max - element.min;
     for (const Direction side : kDirections) {
+      const ElementFace& face = element.faces[static_cast<std::size_t>(side)];
+      if (!face.is_drawn) continue;
+      const VoxelFace* const look = face.face ? &*face.face : type.faces.empty() ? nullptr : &type.faces[side];
       const FaceFrame& frame = frame_of(side);
-      add(element.faces[static_cast<std::size_t>(side)], side, number * size[frame.u] * size[frame.v]);
+      visit(look, number * size[frame.u] * size[frame.v] * visible_share(look));
     }
   };
   const ShapeRules& rules = type.shapes.rules();
@@ -303,7 +299,50 @@ Vec3 mean_of_shapes(const VoxelProperties& type) {
       for (const ShapeElement& element : part.shape.elements()) add_element(element, share_of_positions(part));
     }
   }
-  return weight > 0.0F ? sum / weight : linear_colour(type.colour);
+}
+
+}  // namespace
+
+namespace {
+
+Vec3 mean_colour_of_side(const VoxelProperties& type, const VoxelFace* look) {
+  const Vec3 colour = linear_colour(look == nullptr ? type.colour : look->tint);
+  return look == nullptr || look->texture.is_null() ? colour : colour * look->texture.mean();
+}
+
+}  // namespace
+
+Vec3 mean_of_shapes(const VoxelProperties& type) {
+  Vec3 sum(0.0F);
+  float total = 0.0F;
+  for_each_side(type, [&](const VoxelFace* look, float weight) {
+    sum += weight * mean_colour_of_side(type, look);
+    total += weight;
+  });
+  return total > 0.0F ? sum / total : linear_colour(type.colour);
+}
+
+float emission_share_of_shapes(const VoxelProperties& type) {
+  float sum = 0.0F;
+  float total = 0.0F;
+  for_each_side(type, [&](const VoxelFace* look, float weight) {
+    sum += look == nullptr ? weight : weight * emission_factor(*look);
+    total += weight;
+  });
+  return total > 0.0F ? sum / total : 1.0F;
+}
+
+Vec3 glow_of_shapes(const VoxelProperties& type) {
+  Vec3 sum(0.0F);
+  float total = 0.0F;
+  float greatest = 0.0F;
+  for_each_side(type, [&](const VoxelFace* look, float weight) {
+    const float share = look == nullptr ? 1.0F : emission_factor(*look);
+    sum += weight * share * mean_colour_of_side(type, look);
+    total += weight * share;
+    greatest = std::max(greatest, weight > 0.0F ? share : 0.0F);
+  });
+  return total > 0.0F ? sum * (greatest / total) : Vec3(0.0F);
 }
 
 bool has_glass_parts(const VoxelProperties& type) {

@@ -207,6 +207,25 @@ TEST_F(GltfTextures, HaveSmallCoordinatesFarFromTheOrigin) {
   }
 }
 
+TEST_F(GltfTextures, HaveMaterialsBySharesOfEmission) {
+  const Texture stone = random_texture("stone", 16, 1);
+  VoxelFace dark{.texture = stone, .emission_share = 0};
+  const VoxelFace half{.texture = stone, .emission_share = 51};
+  Grid grid;
+  grid.set({0, 0, 0}, add({.name = "a", .emission = 4.0F, .faces = {dark, {stone}, half}}));
+  add_grid(grid);
+  const ParsedGlb glb = write();
+  std::multiset<float> strengths;
+  for (const Json& material : glb.document["materials"]) {
+    float factor = material.contains("emissiveFactor") ? material["emissiveFactor"][0].get<float>() : 0.0F;
+    if (material.contains("extensions")) {
+      factor *= material["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"].get<float>();
+    }
+    strengths.insert(std::round(1e4F * factor) / 1e4F);
+  }
+  EXPECT_EQ(strengths, (std::multiset<float>{0.0F, 0.8F, 4.0F}));
+}
+
 TEST_F(GltfTextures, HaveAMaterialPerTextureTintAndAlpha) {
   const Texture stone = random_texture("stone", 16, 1);
   const Texture leaf = random_texture("leaf", 32, 2, true);

@@ -209,6 +209,11 @@ SurfaceClass surface_class(const VoxelProperties& properties) {
   return is_transparent ? SurfaceClass::Transparent : SurfaceClass::Opaque;
 }
 
+SurfaceClass surface_class(const VoxelProperties& properties, const VoxelFace* look) {
+  if (look == nullptr || look->emission_share > 0) return surface_class(properties);
+  return properties.visibility == Visibility::Transparent ? SurfaceClass::Transparent : SurfaceClass::Opaque;
+}
+
 namespace {
 
 /// The faces of vertices that do not follow from type, direction and position (VertexLook), for one surface.
@@ -250,8 +255,15 @@ class ChunkTriangles {
  private:
   using Counts = std::array<std::size_t, kSurfaceClasses>;
 
-  [[nodiscard]] SurfaceClass class_of(VoxelType type) const {
-    return type < classes_.size() ? classes_[type] : SurfaceClass::Opaque;
+  [[nodiscard]] SurfaceClass class_of(const Quad& quad) const {
+    const VoxelType type = quad.type();
+    if (type >= classes_.size()) return SurfaceClass::Opaque;
+    return has_dark_faces_ ? class_of_face(quad) : classes_[type];
+  }
+  [[nodiscard]] SurfaceClass class_of_face(const Quad& quad) const {
+    const VoxelProperties& type = types_[quad.type()];
+    if (type.faces.empty()) return classes_[quad.type()];
+    return surface_class(type, &type.faces[quad.orientation().inverse().apply(quad.direction())]);
   }
   [[nodiscard]] Status append_quads(const QuadBuffer& quads, IVec3 origin, BlockyMesh& mesh);
   [[nodiscard]] Status append_outlines(const QuadBuffer& quads, IVec3 origin, BlockyMesh& mesh);
@@ -261,6 +273,7 @@ class ChunkTriangles {
 
   const VoxelRegistry& types_;
   std::vector<SurfaceClass> classes_;  // [VoxelType]
+  bool has_dark_faces_ = false;        // faces of cubes without a share of their type's emission
   bool watertight_;
   OutlineFinder finder_;
   std::vector<OutlinePoint> outline_;
@@ -269,7 +282,12 @@ class ChunkTriangles {
 
 ChunkTriangles::ChunkTriangles(const VoxelRegistry& types, bool watertight)
     : types_(types), classes_(types.size()), watertight_(watertight) {
-  for (std::size_t i = 0; i < classes_.size(); ++i) classes_[i] = surface_class(types[static_cast<VoxelType>(i)]);
+  for (std::size_t i = 0; i < classes_.size(); ++i) {
+    const VoxelProperties& type = types[static_cast<VoxelType>(i)];
+    classes_[i] = surface_class(type);
+    const auto is_dark = [&](Direction each) { return type.faces[each].emission_share == 0; };
+    if (type.emission > 0.0F && !type.faces.empty()) has_dark_faces_ |= std::ranges::any_of(kDirections, is_dark);
+  }
 }
 
 Status ChunkTriangles::append(const QuadBuffer& quads, const ShapeFaceBuffer* shapes, IVec3 chunk, BlockyMesh& mesh) {
@@ -288,7 +306,7 @@ Status ChunkTriangles::append(const QuadBuffer& quads, const ShapeFaceBuffer* sh
 void ChunkTriangles::set_look(const Quad& quad, IVec3 origin, std::size_t first, std::size_t end, BlockyMesh& mesh) {
   const VoxelFaces& faces = types_[quad.type()].faces;
   if (faces.empty()) return;
-  const auto which = static_cast<std::size_t>(class_of(quad.type()));
+  const auto which = static_cast<std::size_t>(class_of(quad));
   BlockyTriangles& out = mesh.surfaces[which];
   out.looks.resize(out.positions.size());
   const std::uint32_t face = looks_[which].number_of(quad, faces, out);
@@ -301,7 +319,7 @@ void ChunkTriangles::set_look(const Quad& quad, IVec3 origin, std::size_t first,
 
 Status ChunkTriangles::append_quads(const QuadBuffer& quads, IVec3 origin, BlockyMesh& mesh) {
   Counts counts{};
-  for (const Quad& quad : quads) ++counts[static_cast<std::size_t>(class_of(quad.type()))];
+  for (const Quad& quad : quads) ++counts[static_cast<std::size_t>(class_of(quad))];
   std::array<Cursor, kSurfaceClasses> next{};
   for (std::size_t i = 0; i < kSurfaceClasses; ++i) {
     BlockyTriangles& out = mesh.surfaces[i];
@@ -309,14 +327,14 @@ Status ChunkTriangles::append_quads(const QuadBuffer& quads, IVec3 origin, Block
     next[i] = grow(vertices_needed(counts[i]), indices_needed(counts[i]), out);
   }
   for (const Quad& quad : quads) {
-    const auto which = static_cast<std::size_t>(class_of(quad.type()));
+    const auto which = static_cast<std::size_t>(class_of(quad));
     put_quad(quad, origin, next[which], mesh.surfaces[which]);
   }
   if (!types_.has_turned_by_state()) return {};
   // The vertices of each surface are in the order of its quads.
   for (std::size_t i = 0; i < kSurfaceClasses; ++i) next[i].vertex -= vertices_needed(counts[i]);
   for (const Quad& quad : quads) {
-    std::size_t& first = next[static_cast<std::size_t>(class_of(quad.type()))].vertex;
+    std::size_t& first = next[static_cast<std::size_t>(class_of(quad))].vertex;
     if (quad.orientation().index() != 0) set_look(quad, origin, first, first + 4, mesh);
     first += 4;
   }
@@ -326,7 +344,7 @@ Status ChunkTriangles::append_quads(const QuadBuffer& quads, IVec3 origin, Block
 Status ChunkTriangles::append_outlines(const QuadBuffer& quads, IVec3 origin, BlockyMesh& mesh) {
   finder_.prepare(quads);
   for (const Quad& quad : quads) {
-    BlockyTriangles& out = mesh.surfaces[static_cast<std::size_t>(class_of(quad.type()))];
+    BlockyTriangles& out = mesh.surfaces[static_cast<std::size_t>(class_of(quad))];
     const std::size_t first = out.positions.size();
     if (first > kMaxVertices) return too_large();
     finder_.outline(quad, outline_);
@@ -338,14 +356,14 @@ Status ChunkTriangles::append_outlines(const QuadBuffer& quads, IVec3 origin, Bl
 
 Status ChunkTriangles::append_shapes(const ShapeFaceBuffer& shapes, IVec3 origin, BlockyMesh& mesh) {
   for (const ShapeFace& face : shapes) {
-    const auto which = static_cast<std::size_t>(class_of(face.type));
+    const ModelFace& shown = face.model_face();
+    const VoxelFace* const look = look_of(*face.model, shown, types_[face.type].faces);
+    const auto which = static_cast<std::size_t>(surface_class(types_[face.type], look));
     BlockyTriangles& out = mesh.surfaces[which];
     const std::size_t first = out.positions.size();
     if (first > kMaxVertices) return too_large();
     append_face(face, origin, out);
     out.looks.resize(out.positions.size());
-    const ModelFace& shown = face.model_face();
-    const VoxelFace* const look = look_of(*face.model, shown, types_[face.type].faces);
     const bool is_inclined = shown.normal != Vec3(normal_of(shown.direction));
     const std::uint32_t number = look == nullptr ? 0 : looks_[which].number_of(*look, out);
     for (std::size_t i = first; i < out.positions.size(); ++i) {

@@ -54,7 +54,7 @@ inline Texture random_texture(int size, unsigned seed) {
   return Texture::from_image("noise", image).value();
 }
 
-/// Returns faces of noise of three sizes, with random turns, mirrors and tints.
+/// Returns faces of noise of three sizes, with random turns, mirrors and tints, and different shares of emission.
 inline VoxelFaces random_faces(unsigned seed) {
   std::mt19937 random(seed);
   std::array<VoxelFace, 6> faces;
@@ -64,6 +64,9 @@ inline VoxelFaces random_faces(unsigned seed) {
     face.mirrored = random() % 2 == 0;
     if (random() % 2 == 0) face.tint = {255, 100, 30, 255};
   }
+  faces[1].emission_share = 0;
+  faces[2].emission_share = 170;
+  faces[5].emission_share = 51;
   return VoxelFaces(faces);
 }
 

@@ -11,16 +11,49 @@
 #include <quoin/core/direction.h>
 #include <quoin/core/memory.h>
 
+#include "grid/shapes/shape_index.h"
 #include "scene/surfaces.h"
 
 namespace quoin {
 namespace {
 
-Vec3 emitted_by(const VoxelProperties& properties) {
-  if (!(properties.emission > 0.0F)) return Vec3(0.0F);
+// Light per face of a voxel or side of a field, by Direction, before the state turns the type.
+using FaceLights = std::array<Vec3, 6>;
+
+// A shape counts as a cube of the mean colour of its emitting sides: games draw a torch with a small flame, but it
+// lights a room.
+FaceLights lights_of(const VoxelProperties& type) {
   const float most = std::numeric_limits<float>::max() / 1e6F;  // so that sums of many are finite
-  return linear_colour(properties.colour) * std::min(properties.emission, most);
+  const float emission = type.emission > 0.0F ? std::min(type.emission, most) : 0.0F;
+  FaceLights lights;
+  lights.fill(linear_colour(type.colour) * emission);
+  if (!has_emission_shares(type)) return lights;
+  if (!type.shapes.empty()) {
+    lights.fill(glow_of_shapes(type) * emission);
+    return lights;
+  }
+  for (const Direction face : kDirections) {
+    const VoxelFace& look = type.faces[face];
+    lights[static_cast<std::size_t>(face)] = mean_colour(look) * (emission * emission_factor(look));
+  }
+  return lights;
 }
+
+// The lights of a chunk's types, each found once.
+class LightsOfTypes {
+ public:
+  explicit LightsOfTypes(const VoxelRegistry& types) : types_(types) {}
+
+  [[nodiscard]] const FaceLights& of(VoxelType type) {
+    const auto [known, is_new] = known_.try_emplace(type);
+    if (is_new) known->second = lights_of(types_[type]);
+    return known->second;
+  }
+
+ private:
+  const VoxelRegistry& types_;
+  std::map<VoxelType, FaceLights> known_;
+};
 
 // Sums over the emitting faces of a cell.
 struct Sum {
@@ -119,6 +152,7 @@ BlockVector<EmissiveCell> look_at(const Grid& grid, const VoxelRegistry& types, 
   if (chunk == nullptr || !has_emissive_types(*chunk, types)) return {};
   constexpr int kAcross = kChunkEdge / EmissiveCells::kEdge;
   std::map<int, Sum> sums;  // by the cell's number
+  LightsOfTypes lights(types);
   GridReader reader(grid);
   const IVec3 corner = at * kChunkEdge;
   for (int z = 0; z < kChunkEdge; ++z) {
@@ -130,10 +164,15 @@ BlockVector<EmissiveCell> look_at(const Grid& grid, const VoxelRegistry& types, 
         Sum& sum =
             sums[(z / EmissiveCells::kEdge * kAcross + y / EmissiveCells::kEdge) * kAcross + x / EmissiveCells::kEdge];
         sum.add_voxel(voxel);
-        const Vec3 light = emitted_by(types[type]);
+        const FaceLights& light = lights.of(type);
+        AxisOrientation unturned;
+        if (types.is_turned_by_state(type) && has_emission_shares(types[type])) {
+          unturned = types[type].orientations.of(grid.data(voxel).state).inverse();
+        }
         for (const Direction face : kDirections) {
           const VoxelType before = grid.get(voxel + normal_of(face));
-          if (!types.is_opaque(before) && before != type) sum.add(voxel, face, light);
+          if (types.is_opaque(before) || before == type) continue;
+          sum.add(voxel, face, light[static_cast<std::size_t>(unturned.apply(face))]);
         }
       }
     }
@@ -148,6 +187,7 @@ BlockVector<EmissiveCell> look_at(const DensityGrid& field, const VoxelRegistry&
   if (chunk == nullptr || !has_emissive_types(chunk->materials(), types)) return {};
   constexpr int kAcross = kChunkEdge / EmissiveCells::kEdge;
   std::map<int, Sum> sums;  // by the cell's number
+  LightsOfTypes lights(types);
   const IVec3 corner = at * kChunkEdge;
   for (int z = 0; z < kChunkEdge; ++z) {
     for (int y = 0; y < kChunkEdge; ++y) {
@@ -162,7 +202,8 @@ BlockVector<EmissiveCell> look_at(const DensityGrid& field, const VoxelRegistry&
           Sum& sum = sums[(z / EmissiveCells::kEdge * kAcross + y / EmissiveCells::kEdge) * kAcross +
                           x / EmissiveCells::kEdge];
           sum.add_box(sample, {sample - 1, sample + 1});
-          sum.add(DVec3(sample - sum.origin) + found->place, face, emitted_by(types[type]) * found->share);
+          const Vec3 light = lights.of(type)[static_cast<std::size_t>(face)];
+          sum.add(DVec3(sample - sum.origin) + found->place, face, light * found->share);
         }
       }
     }
@@ -178,10 +219,32 @@ bool has_emissive_types(const Chunk& chunk, const VoxelRegistry& types) {
                      [&](VoxelType type) { return type < types.size() && types[type].emission > 0.0F; });
 }
 
+bool has_emission_shares(const VoxelProperties& type) {
+  bool has_shares = false;
+  for_each_look(type, [&](const VoxelFace& look) { has_shares |= look.emission_share != 255; });
+  return has_shares;
+}
+
+void add_turned(const Grid& grid, const VoxelRegistry& types, const DataChanges& data, std::vector<IVec3>& chunks) {
+  if (!types.has_turned_by_state()) return;
+  if (data.all) {
+    chunks = grid.chunks();
+    return;
+  }
+  for (const DataChange& change : data.items_unless_all()) chunks.push_back(change.chunk);
+  sort_and_unite(chunks);
+}
+
 void EmissiveCells::update(const Grid& grid, const VoxelRegistry& types) {
-  chunks_.follow(
-      grid, types, [&](const GridChanges& changes) { return chunks_to_mesh(grid, changes); },
-      [&](IVec3 chunk) { return look_at(grid, types, chunk); });
+  ChangeCursor followed_data = followed_data_;
+  const DataChanges data = grid.data_changes_since(followed_data);
+  const auto chunks_of = [&](const GridChanges& changes) {
+    std::vector<IVec3> chunks = chunks_to_mesh(grid, changes);
+    if (!changes.all) add_turned(grid, types, data, chunks);
+    return chunks;
+  };
+  chunks_.follow(grid, types, chunks_of, [&](IVec3 chunk) { return look_at(grid, types, chunk); });
+  followed_data_ = followed_data;
 }
 
 void EmissiveCells::update(const DensityGrid& field, const VoxelRegistry& types) {

@@ -20,6 +20,13 @@ namespace quoin {
 /// Returns true if any type of a chunk's palette emits light. Cost: O(its types).
 [[nodiscard]] bool has_emissive_types(const Chunk& chunk, const VoxelRegistry& types);
 
+/// Returns true if a face of a type or of its shapes does not have all of the type's emission
+/// (VoxelFace::emission_share).
+[[nodiscard]] bool has_emission_shares(const VoxelProperties& type);
+
+/// Appends the chunks whose cubes may be turned in another way after changes of the voxels' data, and sorts `chunks`.
+void add_turned(const Grid& grid, const VoxelRegistry& types, const DataChanges& data, std::vector<IVec3>& chunks);
+
 /// Data about the light-emitting chunks of a grid or field, kept up to date with its edits.
 template <class Item>
 class EmissiveChunks {
@@ -56,12 +63,13 @@ class EmissiveChunks {
 struct EmissiveCell {
   DVec3 centre{0.0};            ///< of the faces that shine, weighted by their power
   double spread_squared = 0.0;  ///< the mean square of their distances from there
-  std::array<Vec3, 6> power{};  ///< colour * emission, linear, times the number of faces, by direction
+  std::array<Vec3, 6> power{};  ///< colour * emission of the faces, linear, summed by direction
   IBox box;                     ///< bounds of the emitting surfaces
 };
 
 /// The emissive cells of one grid or field, kept up to date with its edits. A voxel face emits if the voxel before it
-/// is neither opaque nor of the same type. A field's surface emits along each axis at the lattice edges that it crosses
+/// is neither opaque nor of the same type, and as much as its share of the type's emission; shapes count as cubes. A
+/// field's surface emits along each axis at the lattice edges that it crosses
 /// in that direction, starting at an emitting sample. Each crossing counts as one sample of projected area. Inclined
 /// surfaces are weighted so that the sum is their true area.
 class EmissiveCells {
@@ -80,6 +88,7 @@ class EmissiveCells {
 
  private:
   EmissiveChunks<EmissiveCell> chunks_;
+  ChangeCursor followed_data_;  // the state turns faces
 };
 
 }  // namespace quoin

@@ -341,16 +341,16 @@ void find_transparent(const SceneView& view, const Surfaces& surfaces, const Ray
 }
 
 Surface textured_surface(const Surfaces& surfaces, const GlassBody& body) {
-  const TypeFaces* const faces = surfaces.faces(body.type);
   QUOIN_ASSERT(body.is_textured, "textured glass");
   Surface surface = surfaces[body.type];
   if (body.look != nullptr) {
     surface.colour = linear_colour(body.texel) * linear_colour(body.look->tint);
-    surface.emitted = surface.colour * (faces == nullptr ? 0.0F : faces->sides.front().emission);
+    surface.emitted = surface.colour * (surface.emission * emission_factor(*body.look));
     set_absorption(alpha_of(body.texel), surface);
     return surface;
   }
-  QUOIN_ASSERT(faces != nullptr, "textured glass");
+  const TypeFaces* const faces = surfaces.faces(body.type);
+  QUOIN_ASSERT(faces != nullptr, "a type with textures");
   const FaceTexels& side = faces->sides[static_cast<std::size_t>(body.face)];
   surface.colour = side.colour(body.texel);
   surface.emitted = surface.colour * side.emission;

@@ -647,7 +647,7 @@ Lighting::Colours Lighting::colours_of_shape(const SurfacePoint& point) const {
   const VoxelFace* const look = look_of(*point.model, face, type.faces);
   if (look == nullptr) return colours_of_type(point);
   const Vec3 tint = linear_colour(look->tint);
-  const float emission = emission_of(type);
+  const float emission = emission_of(type) * emission_factor(*look);
   if (look->texture.is_null()) return {tint, tint * emission};
   if (point.is_far) {
     const Vec3 mean = mean_colour(*look);
@@ -682,7 +682,8 @@ Lighting::Colours Lighting::other_colours_at(const SurfacePoint& point) const {
   const FaceTexels* const face = texels_at(point);
   if (face == nullptr) return untextured_colours_at(point);
   const Vec3 colour = textured_colour(*face, point);
-  return {colour, colour * face->emission};
+  const bool is_cell = (*surfaces_)[point.type].emission > 0.0F && is_cell_of_shapes(point);
+  return {colour, colour * (is_cell ? surfaces_->emission_of_shapes(point.type) : face->emission)};
 }
 
 // A loop of its own: a call per point would take a fifth of the time of a lookup.
@@ -706,7 +707,7 @@ __attribute__((noinline)) Lighting::Colours Lighting::untextured_colours_at(cons
   if (point.shape_face >= 0) return colours_of_shape(point);
   if (is_cell_of_shapes(point)) {
     const Vec3 mean = surfaces_->mean_of_shapes(point.type);
-    return {mean, mean * emission_of((*types_)[point.type])};
+    return {mean, mean * surfaces_->emission_of_shapes(point.type)};
   }
   if (point.is_blended && surfaces_->has_textures()) {
     // Cells of halved fields are larger, but textures keep their size.

@@ -156,6 +156,10 @@ LampSample sample_rectangle(const PathLamp& lamp, DVec3 point, Pair u) {
   if (!(sample.density > 0.0F)) return sample;
   const Vec3 radiance = lamp.texels == nullptr ? lamp.radiance : radiance_at(lamp, way - seen.to_corner);
   sample.radiance = radiance / sample.density;
+  if (lamp.is_of_shape) {
+    sample.radiance *= far_light(lamp, sample.distance);
+    sample.density = std::numeric_limits<float>::infinity();
+  }
   return sample;
 }
 
@@ -168,7 +172,7 @@ LampBounds bounds_of(const PathLamp& lamp, DVec3 origin) {
     bounds.high += glm::max(along, Vec3(0.0F));
   }
   bounds.axis = lamp.normal;
-  const float light = std::max(luminance(lamp.radiance), 1e-30F);
+  const float light = std::max(luminance(lamp.radiance) * (1.0F + lamp.far_boost), 1e-30F);
   if (lamp.is_point) {
     bounds.cos_spread = lamp.cos_inner > -2.0F ? std::max(lamp.cos_outer, -1.0F) : -1.0F;
     bounds.cos_edge = bounds.cos_spread > -1.0F ? 1.0F : -1.0F;
@@ -276,15 +280,110 @@ PathLamp lamp_of_quad(const Quad& quad, IVec3 chunk, const PlacedGrid& placed, V
   return lamp;
 }
 
-// Appends the chunks whose quads may have other orientations after changes of the voxels' data.
-void add_turned(const Grid& grid, const VoxelRegistry& types, const DataChanges& data, std::vector<IVec3>& chunks) {
-  if (!types.has_turned_by_state()) return;
-  if (data.all) {
-    chunks = grid.chunks();
-    return;
+// Returns the mean light of the texels that a side shows; hidden ones give none.
+Vec3 mean_light(const ModelFace& side, const VoxelFace& look) {
+  const Vec3 tint = linear_colour(look.tint);
+  if (look.texture.is_null()) return tint;
+  std::array<float, 2> low{1.0F, 1.0F};
+  std::array<float, 2> high{0.0F, 0.0F};
+  for (const std::array<float, 2>& corner : side.uv) {
+    const std::array<float, 2> uv = texture_uv(side, look, corner);
+    for (std::size_t i = 0; i < 2; ++i) {
+      low[i] = std::min(low[i], std::clamp(uv[i], 0.0F, 1.0F));
+      high[i] = std::max(high[i], std::clamp(uv[i], 0.0F, 1.0F));
+    }
   }
-  for (const DataChange& change : data.items_unless_all()) chunks.push_back(change.chunk);
-  sort_and_unite(chunks);
+  // A level where the side shows at most 32 texels per axis.
+  constexpr int kMostTexels = 32;
+  const float widest = std::max({high[0] - low[0], high[1] - low[1], 1e-6F});
+  int level = 0;
+  while (level + 1 < look.texture.level_count() &&
+         widest * static_cast<float>(look.texture.size() >> level) > kMostTexels) {
+    ++level;
+  }
+  const int size = look.texture.size() >> level;
+  const auto first = [&](std::size_t i) {
+    return std::min(static_cast<int>(low[i] * static_cast<float>(size)), size - 1);
+  };
+  const auto end = [&](std::size_t i) {
+    return std::clamp(static_cast<int>(std::ceil(high[i] * static_cast<float>(size))), first(i) + 1, size);
+  };
+  const std::span<const Rgba8> texels = look.texture.level(level);
+  Vec3 sum(0.0F);
+  for (int y = first(1); y < end(1); ++y) {
+    for (int x = first(0); x < end(0); ++x) {
+      const Rgba8 texel =
+          texels[static_cast<std::size_t>(y) * static_cast<std::size_t>(size) + static_cast<std::size_t>(x)];
+      const float share = look.alpha == FaceAlpha::Opaque ? 1.0F : static_cast<float>(texel.a) / 255.0F;
+      sum += linear_colour(texel) * share;
+    }
+  }
+  return sum * tint / static_cast<float>((end(0) - first(0)) * (end(1) - first(1)));
+}
+
+// The light of each side of a model that is a lamp; 0 for other sides.
+struct SideLights {
+  std::vector<Vec3> lights;
+  float far_boost = 0.0F;
+};
+
+// From afar, all together give the light of a voxel's six sides, as EmissiveCells do: a torch with a small flame lights
+// a room.
+SideLights lights_of(const ShapeModel& model, const VoxelProperties& type) {
+  constexpr float kSides = 6.0F;
+  SideLights made{std::vector<Vec3>(model.faces.size(), Vec3(0.0F))};
+  std::vector<Vec3>& lights = made.lights;
+  float area = 0.0F;
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    const ModelFace& side = model.faces[i];
+    const VoxelFace* const look = look_of(model, side, type.faces);
+    if (!is_lamp_side(side, look, type)) continue;
+    area += glm::length(side.corners[1] - side.corners[0]) * glm::length(side.corners[3] - side.corners[0]);
+    lights[i] = emission_of(type) *
+                (look == nullptr ? linear_colour(type.colour) : mean_light(side, *look) * emission_factor(*look));
+  }
+  if (area > 0.0F) made.far_boost = std::max(kSides / area - 1.0F, 0.0F);
+  return made;
+}
+
+BlockVector<ShapeLamp> lamps_of_shapes(const Grid& grid, const VoxelRegistry& types, IVec3 chunk,
+                                       BlockyMesher& mesher) {
+  const Chunk* found = grid.find_chunk(chunk);
+  const auto is_lamp = [&](VoxelType type) { return types.is_shaped(type) && types[type].emission > 0.0F; };
+  if (found == nullptr || !types.has_shapes() || std::ranges::none_of(found->types(), is_lamp)) return {};
+  QuadBuffer quads;
+  ShapeFaceBuffer sides;
+  mesher.mesh(grid.neighbourhood(chunk), types, {.bake_occlusion = false}, quads, sides);
+  BlockVector<ShapeLamp> lamps;
+  std::map<std::pair<const ShapeModel*, VoxelType>, SideLights> known;
+  for (const ShapeFace& side : sides) {
+    if (!is_lamp(side.type)) continue;
+    const auto [lights, is_new] = known.try_emplace({side.model, side.type});
+    if (is_new) lights->second = lights_of(*side.model, types[side.type]);
+    const Vec3 light = lights->second.lights[side.face];
+    if (is_black(light)) continue;
+    const Vec3 corner = side.corner(0);
+    lamps.push_back({corner, side.corner(1) - corner, side.corner(3) - corner, side.model_face().normal, light,
+                     lights->second.far_boost});
+  }
+  return lamps;
+}
+
+PathLamp lamp_of_side(const ShapeLamp& side, IVec3 chunk, const PlacedGrid& placed, float factor) {
+  PathLamp lamp;
+  lamp.is_of_shape = true;
+  const DVec3 corner = DVec3(chunk * kChunkEdge) + DVec3(side.corner);
+  lamp.corner = placed.position + placed.world_axes * ((corner - placed.pivot) * placed.voxel_size);
+  const auto turned = [&](const Vec3& along) { return glm::normalize(Vec3(placed.world_axes * DVec3(along))); };
+  lamp.u = turned(side.u);
+  lamp.v = turned(side.v);
+  lamp.normal = turned(side.normal);
+  lamp.size_u = static_cast<float>(glm::length(DVec3(side.u)) * placed.voxel_size);
+  lamp.size_v = static_cast<float>(glm::length(DVec3(side.v)) * placed.voxel_size);
+  lamp.radiance = side.radiance * factor;
+  lamp.far_boost = side.far_boost;
+  lamp.voxel_size = static_cast<float>(placed.voxel_size);
+  return lamp;
 }
 
 PathLamp lamp_without_body(const PlacedLamp& from) {
@@ -330,12 +429,26 @@ std::shared_ptr<const PathLamps> PathLampCache::lamps(const Scene& scene, std::s
         if (!changes.all) add_turned(grid, scene.types, data, chunks);
         return chunks;
       };
+      const auto near_shapes = [&](const GridChanges& changes) {
+        if (changes.all || data.all) return grid.chunks();
+        std::vector<IVec3> chunks = chunks_to_mesh(grid, changes);
+        const auto add = [&](const auto& change) { add_chunks_near(change.chunk, change.box, kShapeReach, chunks); };
+        for (const ChunkChange& change : changes.items_unless_all()) add(change);
+        for (const DataChange& change : data.items_unless_all()) add(change);
+        sort_and_unite(chunks);
+        return chunks;
+      };
       of.quads.follow(grid, scene.types, chunks_of,
                       [&](IVec3 chunk) { return emissive_quads(grid, scene.types, chunk, mesher); });
+      of.sides.follow(grid, scene.types, near_shapes,
+                      [&](IVec3 chunk) { return lamps_of_shapes(grid, scene.types, chunk, mesher); });
       of.followed_data = followed_data;
     }
+    const auto factor = static_cast<float>(std::min(brightness, 1e9));
+    of.sides.for_each([&](IVec3 chunk, const ShapeLamp& side) {
+      if (!is_black(side.radiance * factor)) lamps.push_back(lamp_of_side(side, chunk, placed[i], factor));
+    });
     of.quads.for_each([&](IVec3 chunk, const Quad& quad) {
-      const auto factor = static_cast<float>(std::min(brightness, 1e9));
       const TypeFaces* const textured = surfaces.faces(quad.type());
       const AxisOrientation unturned = quad.orientation().inverse();
       const FaceTexels* const side =

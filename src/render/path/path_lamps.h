@@ -32,7 +32,9 @@ struct PathLamp {
   float size_v = 0.0F;
   Vec3 radiance{0.0F};  ///< without a body: intensity
   bool is_point = false;
-  float cos_inner = -2.0F;  ///< of a spot, as in PlacedLamp
+  bool is_of_shape = false;  ///< a side of a shape: paths do not add its light when they meet it by chance
+  float far_boost = 0.0F;    ///< of a side of a shape: see far_light
+  float cos_inner = -2.0F;   ///< of a spot, as in PlacedLamp
   float cos_outer = -3.0F;
   float reach = 0.0F;  ///< of a lamp without a body
   /// The texture of the face, whose mean is `radiance`; null without one. The Surfaces of PathLampCache::lamps own it.
@@ -43,12 +45,19 @@ struct PathLamp {
   float light_of_texel = 0.0F;       ///< radiance as a multiple of the texel's colour
 };
 
+/// Returns the light of a side of a shape at a distance, as a multiple of its radiance: from afar
+/// 1 + PathLamp::far_boost. Below half a voxel the boost fades: close to a small lamp, light would be noise.
+[[nodiscard]] inline float far_light(const PathLamp& lamp, float distance) {
+  const float square = distance * distance;
+  return 1.0F + lamp.far_boost * square / (square + 0.25F * lamp.voxel_size * lamp.voxel_size);
+}
+
 /// Light from a lamp towards a point.
 struct LampSample {
   Vec3 direction{0.0F};  ///< to the lamp, unit, in the world
   float distance = 0.0F;
   Vec3 radiance{0.0F};   ///< divided by the density; 0: none
-  float density = 0.0F;  ///< by solid angle; infinite for a lamp without a body
+  float density = 0.0F;  ///< by solid angle; infinite for a lamp that paths do not meet by chance
 };
 
 /// All lamps of a scene, for points anywhere.
@@ -96,6 +105,16 @@ class PathLamps {
   std::size_t face_count_ = 0;
 };
 
+/// A rectangular side of a shape that emits (is_lamp_side), in voxels from its chunk's lower corner.
+struct ShapeLamp {
+  Vec3 corner{0.0F};
+  Vec3 u{0.0F};  ///< along its sides, perpendicular
+  Vec3 v{0.0F};
+  Vec3 normal{0.0F};
+  Vec3 radiance{0.0F};
+  float far_boost = 0.0F;  ///< PathLamp::far_boost
+};
+
 /// Keeps the emissive faces of a scene's grids up to date across edits.
 class PathLampCache {
  public:
@@ -108,7 +127,8 @@ class PathLampCache {
  private:
   struct OfGrid {
     EmissiveChunks<Quad> quads;
-    ChangeCursor followed_data;  // the state turns faces
+    EmissiveChunks<ShapeLamp> sides;
+    ChangeCursor followed_data;  // the state turns faces and selects shapes
   };
   std::map<GridHandle, OfGrid> quads_;
 };

@@ -1,8 +1,10 @@
 // Textures in path-traced images: texels of opaque types, paths through cutout and translucent texels, textured lamps.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
+#include <vector>
 
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
@@ -354,6 +356,84 @@ TEST(PathShapes, PathsMeetOnlyTheForm) {
   EXPECT_EQ(image.types[16 * 12 + 8], ground);
   EXPECT_FLOAT_EQ(image.depth.values[16 * 4 + 8], 9.5F);
   EXPECT_FLOAT_EQ(image.depth.values[16 * 12 + 8], 10.0F);
+}
+
+// A white cube of emission 0.5 that emits two fifths of it from +Z and nothing from its other sides.
+VoxelProperties cube_with_front() {
+  VoxelProperties cube{.name = "cube", .emission = 0.5F};
+  std::array<VoxelFace, 6> faces;
+  for (VoxelFace& face : faces) {
+    face = {.texture = drawn([](int, int) { return Rgba8{255, 255, 255, 255}; }), .emission_share = 0};
+  }
+  faces[static_cast<std::size_t>(Direction::PosZ)].emission_share = 102;
+  cube.faces = VoxelFaces(faces);
+  return cube;
+}
+
+// A thin post with a head of 2 sixteenths that emits.
+VoxelProperties post_with_head(std::uint8_t head_share = 255) {
+  std::vector<ShapeElement> elements{{.min = {7, 0, 7}, .max = {9, 8, 9}}, {.min = {7, 8, 7}, .max = {9, 10, 9}}};
+  for (ElementFace& face : elements[0].faces) face.face = VoxelFace{.tint = {90, 60, 30}, .emission_share = 0};
+  for (ElementFace& face : elements[1].faces)
+    face.face = VoxelFace{.tint = {255, 220, 120}, .emission_share = head_share};
+  VoxelProperties post{.name = "post", .colour = {90, 60, 30, 255}, .emission = 1.0F};
+  post.shapes = *VoxelShape::from_elements(elements);
+  return post;
+}
+
+double light_of_floor(const VoxelProperties& lamp, bool has_other_lamp, int samples = 256) {
+  Scene scene;
+  const VoxelType white = add_type(scene, {200, 200, 200});
+  const VoxelType far = add_type(scene, {255, 255, 255}, Visibility::Opaque, 1.0F);
+  const VoxelType type = scene.types.add(lamp).value();
+  Grid grid;
+  grid.fill_box({{-6, -1, -6}, {7, 0, 7}}, white);
+  grid.set({0, 0, 0}, type);
+  if (has_other_lamp) grid.set({0, -300, 0}, far);
+  place(scene, std::move(grid));
+  PathOptions options = under_even_sky(16, 16, samples);
+  physical_in(options).sky.brightness = 0.0;
+  options.max_bounces = 2;
+  const PathImage image = path_image(scene, from_above(3.5, 20.0, 0.5, 2.0), options);
+  double sum = 0.0;
+  for (const Vec3& light : image.radiance) sum += static_cast<double>(light.x + light.y + light.z);
+  return sum / static_cast<double>(image.radiance.size());
+}
+
+// Other lamps must not take away the light of shapes.
+TEST(PathShapes, SamplesSidesThatEmit) {
+  const double alone = light_of_floor(post_with_head(), false);
+  EXPECT_GT(alone, 0.01);
+  EXPECT_NEAR(light_of_floor(post_with_head(), true) / alone, 1.0, 0.05);
+  EXPECT_NEAR(light_of_floor(post_with_head(51), false) / alone, 0.2, 0.02);
+  EXPECT_EQ(light_of_floor(post_with_head(0), false), 0.0);
+}
+
+// The sides of a small head give about the light of a whole cube, and a cube as a shape the same.
+TEST(PathShapes, LightsUpAsCubes) {
+  VoxelProperties cube{.name = "cube", .colour = {255, 220, 120, 255}, .emission = 1.0F};
+  const double as_cube = light_of_floor(cube, false);
+  VoxelProperties box = cube;
+  box.shapes = VoxelShape::box({0, 0, 0}, {16, 16, 16});
+  EXPECT_NEAR(light_of_floor(box, false) / as_cube, 1.0, 0.05);
+  const double torch = light_of_floor(post_with_head(), false);
+  EXPECT_GT(torch / as_cube, 0.5);
+  EXPECT_LT(torch / as_cube, 2.0);
+}
+
+TEST(PathTextures, ShowSharesOfEmission) {
+  Scene scene;
+  const VoxelType type = scene.types.add(cube_with_front()).value();
+  Grid grid;
+  grid.set({0, 0, 0}, type);
+  place(scene, std::move(grid));
+  PathOptions options = under_even_sky(4, 4, 4);
+  physical_in(options).sky.brightness = 0.0;
+  const auto shown = [&](DVec3 eye) {
+    return path_image(scene, towards(eye, {0.5, 0.5, 0.5}, 0.05), options).radiance[5].x;
+  };
+  EXPECT_NEAR(shown({0.5, 0.5, 9.0}), 0.2F, 1e-4F);
+  EXPECT_EQ(shown({9.0, 0.5, 0.5}), 0.0F);
 }
 
 }  // namespace

@@ -409,11 +409,18 @@ Surface surface_of_shape(const VoxelProperties& type, const Surfaces& surfaces, 
   if (look == nullptr) return surface;
   surface.colour = linear_colour(look->tint);
   if (!look->texture.is_null()) surface.colour *= linear_colour(shape_texel(face, *look, point - DVec3(hit.voxel)));
-  surface.emitted = surface.colour * emission_of(type);
+  surface.emitted = surface.colour * (surface.emission * emission_factor(*look));
   return surface;
 }
 
 }  // namespace
+
+bool PathTile::is_lamp(const ShapeHit& hit) const {
+  if (hit.face < 0) return false;
+  const VoxelProperties& type = context_->view->tracer().scene().types[hit.type];
+  const ModelFace& side = hit.model->faces[static_cast<std::size_t>(hit.face)];
+  return glm::dot(hit.normal, side.normal) > 0.0F && is_lamp_side(side, look_of(*hit.model, side, type.faces), type);
+}
 
 void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane) {
   Path& path = paths_[index];
@@ -477,8 +484,8 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
     note_part(path, vertex, surface_id(voxel, face, in_field, vertex.placed, is_matte ? kAir : type), in_field);
   }
   note_layers(path, vertex, hits.grids.t[i], type);
-  // The lamps stand for cubes: of a shape, they give all light that paths between surfaces could find.
-  if (!is_black(surface.emitted) && (!in_shape || path.is_seen || light_.lamps == nullptr)) {
+  // Light from lamps of shapes is only sampled.
+  if (!is_black(surface.emitted) && (path.is_seen || !in_shape || !is_lamp(hits.shapes[i]))) {
     const std::int32_t lamp = in_field || in_shape ? -1 : context_->lamps->lamp_of(vertex.placed, voxel, face);
     add_emitted(path, surface.emitted, lamp, static_cast<float>(hits.grids.t[i]));
   }

@@ -180,6 +180,8 @@ class PathTile {
   void hit_ground(std::uint32_t index, double t);
   [[nodiscard]] double ground_at(const DVec3& origin, Vec3 direction) const;  // infinite: nowhere
   void add_emitted(Path& path, Vec3 emitted, std::int32_t lamp, float distance) const;
+  // Returns true if a ray meets a side of a shape that is a lamp.
+  [[nodiscard]] bool is_lamp(const ShapeHit& hit) const;
   void note_layers(Path& path, const Vertex& vertex, double t, VoxelType type);
   // Records the surface that a path would meet without fog and clouds, which it meets at random.
   void note_behind(Path& path, const SceneHits& hits, int lane, double t);

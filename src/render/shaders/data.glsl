@@ -183,7 +183,7 @@ const uint kIsTurnedByState = 0x80000000u;
 // A face of a type: the address of its texels, of all mipmap levels, level 0 first. Then in bits 0-3 log2 of the texels
 // per side; for the texture's rows (bits 4-6) and columns (8-10) the axis of the grid, plus 4 if they run against it;
 // the use of alpha (12-13: opaque, cutout, translucent); and the face's turn (16-17) and mirror (18). Then the tint in
-// sRGB. `tint`: in linear light; w: the emission. `on_fields`: field_textures.glsl.
+// sRGB. `tint`: in linear light; w: the face's emission. `on_fields`: field_textures.glsl.
 struct TexturedFace {
   uvec4 what;
   vec4 tint;
@@ -315,8 +315,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   uvec2 textured_faces;
   uvec2 shape_grids;   // ShapeTrees of the first grids; the others have no shapes
   uvec2 shape_models;  // vectors: shapes.glsl
-  uvec2 shape_means;   // per type: the mean colour of its shapes, for cells of halved grids; negative for a type
-                       // without shapes; w: the emission, as a multiple of colours
+  uvec2 shape_means;   // two vectors per type: the mean colour of its shapes, for cells of halved grids; negative for a
+                       // type without shapes; w: the emission, as a multiple of colours; then x: the cells' share of it
   uint shaped_grids;   // their number
 };
 

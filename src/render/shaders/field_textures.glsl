@@ -45,15 +45,14 @@ void show_on_field(uint type, FieldPoint point, inout Surface surface) {
   inside = fract(inside);
   vec3 weights = triplanar_weights(point.normal, uintBitsToFloat(rule[0]), uintBitsToFloat(rule[1]));
   float square_spacing = point.square_spacing * scale * scale;
-  surface.colour = vec3(0.0);
-  float emission = 0.0;
+  surface.colour = surface.emitted = vec3(0.0);
   for (int axis = 0; axis < 3; ++axis) {
     if (!(weights[axis] > 0.0)) continue;
     uint side = first + 2 * axis + (point.normal[axis] < 0.0 ? 1 : 0);
     uvec4 what = faces.at[side].what;
     vec4 tint = faces.at[side].tint;
-    surface.colour += weights[axis] * tint.xyz * texel_of(what, inside, square_spacing);
-    emission = tint.w;
+    vec3 colour = weights[axis] * tint.xyz * texel_of(what, inside, square_spacing);
+    surface.colour += colour;
+    surface.emitted += colour * tint.w;
   }
-  surface.emitted = surface.colour * emission;
 }

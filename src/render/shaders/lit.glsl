@@ -29,7 +29,7 @@ uint fluid_of(uint type) {
 bool show_mean_of_shapes(uint type, inout Surface surface) {
   vec4 mean = mean_of_shapes(type);
   if (mean.x < 0.0) return false;
-  set_texel(mean.xyz, vec4(1.0, 1.0, 1.0, mean.w), surface);
+  set_texel(mean.xyz, vec4(1.0, 1.0, 1.0, mean.w * emission_share_of_shapes(type)), surface);
   return true;
 }
 

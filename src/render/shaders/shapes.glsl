@@ -14,7 +14,7 @@
 //          numbers of its sides, 16 bits each, kNoSide for those that are not drawn
 //   then   turns, four vectors each: origin, and the rows of the matrix
 //   then   sides, kSideVectors each: plane; texture coordinates rightwards and downwards as functions of the position;
-//          address of the texels, flags, square of the texture's sides per voxel; tint, w: emission
+//          address of the texels, flags, square of the texture's sides per voxel; tint, w: the side's emission
 
 const uint kBoxVectors = 3;
 const uint kSideVectors = 5;
@@ -35,6 +35,7 @@ const uint kSideHasTexels = 1u << 7;
 const uint kSideIsGlass = 1u << 8;
 const uint kSideIsOnVoxel = 1u << 9;   // it lies on a side of the voxel
 const uint kSideIsTilted = 1u << 10;
+const uint kSideIsLamp = 1u << 11;  // of path tracing
 const uint kSideDirection = 12;  // bits: the direction nearest to its normal
 
 // A side in points and bodies: its index in the table; with this flag, seen from behind.

@@ -11,9 +11,13 @@ uint texture_entry(uint type) {
 }
 
 // Returns the mean colour of a type's shapes, which cells of halved grids show; negative if it has none. w: the
-// emission.
+// emission of the type.
 vec4 mean_of_shapes(uint type) {
-  return Vectors(frame().shape_means).at[min(type, frame().last_surface)];
+  return Vectors(frame().shape_means).at[2 * min(type, frame().last_surface)];
+}
+// Returns the share of the type's emission that these cells have.
+float emission_share_of_shapes(uint type) {
+  return Vectors(frame().shape_means).at[2 * min(type, frame().last_surface) + 1].x;
 }
 
 // Returns the number of a type's textured faces, from 1; 0 if it has none.

@@ -20,7 +20,8 @@ namespace quoin::propagated {
 
 /// Returns the lamp light that a type emits; 0 for most types. An `emission` of 1 or more gives level 15 in the
 /// brightest channel of the type's colour, and the other channels in proportion to their sRGB values. A lower emission
-/// scales the levels. `sky` is 0.
+/// scales the levels. `sky` is 0. Levels are per voxel, as in block games: shares of faces (VoxelFace::emission_share)
+/// make no difference.
 [[nodiscard]] LightLevels lamp_levels(const VoxelProperties& properties);
 
 /// The light properties of a voxel type.

@@ -63,7 +63,7 @@ class VertexLights {
         std::array<MeanLevels, 1> mean;
         const Vec3 sample = view.positions[vertex] - 0.5F;  // samples are at the centres of voxels
         surface.read({{&sample, 1}, {&normal, 1}}, mean);
-        out[i] = stored(mean[0], normal, emission_of(view.types[vertex]));
+        out[i] = stored(mean[0], normal, emission_at(view, vertex));
         continue;
       }
       const std::size_t corner = vertex % 4;
@@ -74,11 +74,16 @@ class VertexLights {
       if (corner == 1 || corner == 2) --voxel[frame.u];
       if (corner >= 2) --voxel[frame.v];
       const MeanLevels levels = levels_of_corner(surface.face(voxel, direction)[corner]);
-      out[i] = stored(levels, Vec3(normal_of(direction)), emission_of(view.types[vertex]));
+      out[i] = stored(levels, Vec3(normal_of(direction)), emission_at(view, vertex));
     }
   }
 
-  [[nodiscard]] float emission_of(VoxelType type) const { return type < types_.size() ? types_[type].emission : 0.0F; }
+  [[nodiscard]] float emission_at(const MeshView& view, std::size_t vertex) const {
+    const VoxelType type = view.types[vertex];
+    if (type >= types_.size() || !(types_[type].emission > 0.0F)) return 0.0F;
+    const VoxelFace* const face = face_at(view, vertex, types_);
+    return types_[type].emission * (face == nullptr ? 1.0F : emission_factor(*face));
+  }
 
   [[nodiscard]] LinearRgba16 stored(const MeanLevels& levels, Vec3 normal, float emission) const {
     const Vec3 light = exposure_ * (light_colour(levels, normal, look_) + std::max(emission, 0.0F));

@@ -55,11 +55,12 @@ struct PathLamp {
   vec4 corner;  // in view; w: the reach of a lamp without a body, else 0
   vec4 u;       // unit; w: size
   vec4 v;
-  vec4 normal;    // w: cosine of a spot's inner angle
+  vec4 normal;    // w: cosine of a spot's inner angle; below kOnlySampled: a side of a shape
   vec4 radiance;  // w: cosine of its outer angle; of a face with a texture: the mean
   uvec4 texels;   // of a face with a texture, as in TexturedFace; w: how to turn its voxels back (turned_cube), and
                   // from bit 16 on the face in the grid. z is 0 without a texture
-  vec4 light_of_texel;  // radiance as a multiple of the texel's colour; w: world units per voxel
+  vec4 light_of_texel;  // radiance as a multiple of the texel's colour; w: world units per voxel. Of a side of a shape,
+                        // x: PathLamp::far_boost
 };
 struct LampNode {
   vec4 low;   // in view; w: power

@@ -8,6 +8,7 @@ struct LampSample {
 };
 
 const float kSmallLamp = 0.01;
+const float kOnlySampled = -3.0;  // above PathLamp::normal.w of lamps that paths do not find by scattering
 
 // A rectangle as seen from a point in front of it.
 struct SphericalRectangle {
@@ -93,6 +94,13 @@ vec3 radiance_at(PathLamp lamp, vec3 from_corner) {
   return linear_from_srgb(unpackUnorm4x8(texel).xyz) * lamp.light_of_texel.xyz;
 }
 
+// Returns the light of a side of a shape at a distance, as a multiple of its radiance.
+float far_light(PathLamp lamp, float distance) {
+  float square = distance * distance;
+  float size = lamp.light_of_texel.w;
+  return 1.0 + lamp.light_of_texel.x * square / (square + 0.25 * size * size);
+}
+
 LampSample sample_of_lamp(PathLamp lamp, vec3 point, vec2 u) {
   LampSample found = LampSample(vec3(0.0), 0.0, vec3(0.0), 0.0);
   float reach = lamp.corner.w;
@@ -118,6 +126,10 @@ LampSample sample_of_lamp(PathLamp lamp, vec3 point, vec2 u) {
     vec3 radiance = lamp.radiance.xyz;
     if (kHasTextures && lamp.texels.z != 0) radiance = radiance_at(lamp, way - seen.to_corner);
     if (found.density > 0.0) found.radiance = radiance / found.density;
+    if (lamp.normal.w < kOnlySampled) {
+      found.radiance *= far_light(lamp, found.distance);
+      found.density = kInfinity;
+    }
     return found;
   }
   if (found.distance >= reach) return found;

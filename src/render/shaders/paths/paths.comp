@@ -463,9 +463,10 @@ uint hit_matter(Hit hit, vec3 origin) {
               hit.in_field, vertex.normal, vertex.in_view);
   }
   note_layers(hit.t + behind, hit.type);
-  // The lamps stand for cubes: of a shape, they give all light that paths between surfaces could find.
-  bool is_lamp_seen = !kHasShapes || !hit.in_shape || is(kIsSeen) || path_frame().lamp_count == 0;
-  if (!is_black(surface.emitted) && is_lamp_seen) {
+  // Light from lamps of shapes is only sampled.
+  bool is_sampled = kHasShapes && hit.in_shape && (hit.side & kFromBehind) == 0 &&
+                    (side_flags(hit.side) & kSideIsLamp) != 0;
+  if (!is_black(surface.emitted) && (is(kIsSeen) || !is_sampled)) {
     int lamp = is_on_face ? lamp_of_face(hit.voxel.w, voxel, hit.face) : -1;
     add_emitted(surface.emitted, lamp, origin, hit.t);
   }

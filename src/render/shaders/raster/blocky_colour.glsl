@@ -44,6 +44,8 @@ vec4 colour_of_shape() {
   if (texels.z != 0) {
     show_alpha(vec3(colour.xy, 0.0), shape_tint(), surface);
     show_texture_of_shape(surface);
+  } else {
+    surface.emitted *= colour.z;
   }
   if (drawn() == kDepth) return vec4(0.0);
   if (has(kShowNormals)) return vec4(0.5 + 0.5 * shape_normal(), 1.0);

@@ -58,7 +58,8 @@ float square_spacing_at(vec3 at) {
 
 // Shapes. The vertex shader's outputs (shape.glsl) are the normal of the side that is seen in `edges`, the direction
 // nearest to it and the voxel in `what.x`, the texture's coordinates and the emission in `colour`, and the texture in
-// `texels`: z is 0 if the face has the colour of its type, w the tint in sRGB.
+// `texels`: z is 0 if the face has the colour of its type, w the tint in sRGB. The emission is then a share of the
+// type's.
 
 vec3 shape_tint() {
   return linear_from_srgb(unpackUnorm4x8(texels.w).xyz);

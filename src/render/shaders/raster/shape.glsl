@@ -6,7 +6,8 @@ struct ShapeRecord {
   vec4 corners[4];  // w: the texture's coordinate to the right
   vec4 down;        // the texture's other coordinate
   vec4 normal;      // w: the square of the texture's sides per voxel
-  uvec4 what;       // of a face with a texture of its own, as in TexturedFace, with axes x and y; and the bits below
+  uvec4 what;       // of a face with a look of its own, as in TexturedFace, with axes x and y; and the bits below. The
+                    // tint's alpha is the face's share of the type's emission
 };
 
 // Bits of the third number in `what`.
@@ -53,7 +54,7 @@ void put_shape(Seen seen, uvec2 records, uvec2 shapes, uint number, uint index, 
   vec4 down = all.at[i].down;
   vec2 uv = vec2(own.w, down[corner]);
   bool has_look = (found.z & kOwnLook) != 0;
-  float emission = 0.0;
+  float emission = 1.0;  // without a texture: as a share of the type's
   uint type_look = found.z >> kTypeLookShift & 7;
   if (kHasTextures && !has_look && type_look != kNoLook) {
     uint of_type = textures_of(type);
@@ -96,10 +97,9 @@ void put_shape(Seen seen, uvec2 records, uvec2 shapes, uint number, uint index, 
   }
   gl_Position = clip_from(seen.clip, point + widened);
 
-  if ((found.z & kOwnLook) != 0) {
-    vec4 mean = mean_of_shapes(type);
-    emission = mean.w;
-  }
+  bool is_own = (found.z & kOwnLook) != 0;
+  if (is_own || type_look == kNoLook) emission = unpackUnorm4x8(found.w).w;
+  if (is_own) emission *= mean_of_shapes(type).w;
   uint direction = found.z >> kNormalShift & 7;
   ivec4 home = mesh_frame().instances[placed].home;
   place = vec4(local + widened, openness_of(words.x >> 18 & 0xFF, corner));

@@ -56,6 +56,7 @@ std::uint32_t side_flags(const ModelFace& face, const VoxelFace* look, const Vox
   if (!has_texels || look->alpha == FaceAlpha::Translucent) flags |= kSideIsGlass;
   if (face.on_side) flags |= kSideIsOnVoxel;
   if (face.normal != Vec3(normal_of(face.direction))) flags |= kSideIsTilted;
+  if (is_lamp_side(face, look, type)) flags |= kSideIsLamp;
   return flags;
 }
 
@@ -394,7 +395,8 @@ Status DeviceShapes::add_side(const ModelFace& face, const ShapeModel& model, co
   vectors_.insert(vectors_.end(), along.begin(), along.end());
   add_numbers(static_cast<std::uint32_t>(address), static_cast<std::uint32_t>(address >> 32),
               side_flags(face, look, type), std::bit_cast<std::uint32_t>(density), vectors_);
-  vectors_.emplace_back(look == nullptr ? Vec3(1.0F) : linear_colour(look->tint), emission_of(type));
+  vectors_.emplace_back(look == nullptr ? Vec3(1.0F) : linear_colour(look->tint),
+                        emission_of(type) * (look == nullptr ? 1.0F : emission_factor(*look)));
   return {};
 }
 
@@ -603,13 +605,15 @@ std::vector<Vec4> surface_table(const VoxelRegistry& types) {
 
 std::vector<Vec4> shape_means(const VoxelRegistry& types) {
   std::vector<Vec4> means;
-  means.reserve(types.size() + 1);
+  means.reserve(2 * (types.size() + 1));
   for (std::size_t i = 0; i < types.size(); ++i) {
     const auto type = static_cast<VoxelType>(i);
-    const Vec3 mean = types.is_shaped(type) ? mean_of_shapes(types[type]) : Vec3(-1.0F);
-    means.emplace_back(mean, emission_of(types[type]));
+    const bool is_shaped = types.is_shaped(type);
+    means.emplace_back(is_shaped ? mean_of_shapes(types[type]) : Vec3(-1.0F), emission_of(types[type]));
+    means.emplace_back(is_shaped ? emission_share_of_shapes(types[type]) : 1.0F, 0.0F, 0.0F, 0.0F);
   }
   means.emplace_back(Vec3(-1.0F), 0.0F);
+  means.emplace_back(1.0F, 0.0F, 0.0F, 0.0F);
   return means;
 }
 

@@ -61,7 +61,7 @@ void add_surface(const Surface& surface, float last, std::vector<Vec4>& table);
 /// Returns the surfaces of all types in the form of shaders/data.glsl: three vectors each; the last entry is for types
 /// out of range. Requires: a frame with it has kUnoccluding if any of the types does not occlude, or has shapes.
 [[nodiscard]] std::vector<Vec4> surface_table(const VoxelRegistry& types);
-/// Returns `shape_means` of shaders/data.glsl for all types; the last entry is for types out of range.
+/// Returns `shape_means` of shaders/data.glsl for all types; the last two vectors are for types out of range.
 [[nodiscard]] std::vector<Vec4> shape_means(const VoxelRegistry& types);
 
 /// The texels of a texture in device memory, of all mipmap levels.

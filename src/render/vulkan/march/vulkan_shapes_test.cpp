@@ -32,7 +32,7 @@ struct Garden {
   GridHandle grid;
 
   explicit Garden(bool has_glass, DVec3 position = DVec3(0.0)) {
-    VoxelProperties stairs{.name = "textured", .state_bits = 3};
+    VoxelProperties stairs{.name = "textured", .emission = 0.6F, .state_bits = 3};
     stairs.faces = random_faces(5);
     stairs.orientations = StateOrientations::about_y_and_upside_down();
     stairs.shapes = scene.types[types.stairs].shapes;

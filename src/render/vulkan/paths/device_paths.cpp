@@ -180,8 +180,10 @@ LampTables lamp_tables(const path::PathLamps& lamps, const KnownTexels& texels, 
     lamp.corner = Vec4(Vec3(from.corner - view_origin), from.is_point ? from.reach : 0.0F);
     lamp.u = Vec4(from.u, from.size_u);
     lamp.v = Vec4(from.v, from.size_v);
-    lamp.normal = Vec4(from.normal, from.cos_inner);
+    constexpr float kOfShape = -4.0F;  // see kOnlySampled in path_lamps.glsl
+    lamp.normal = Vec4(from.normal, from.is_of_shape ? kOfShape : from.cos_inner);
     lamp.radiance = Vec4(from.radiance, from.cos_outer);
+    if (from.is_of_shape) lamp.light_of_texel = Vec4(from.far_boost, 0.0F, 0.0F, from.voxel_size);
     if (from.texels != nullptr) put_texels(from, texels, lamp);
   }
   const Vec3 to_view(lamps.origin() - view_origin);

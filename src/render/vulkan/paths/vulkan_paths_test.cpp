@@ -346,7 +346,7 @@ TEST_F(VulkanPaths, MatchCpuOnShapes) {
   if (!is_nightly()) GTEST_SKIP() << "nightly only";
   Scene scene;
   const ShapeTypes types(scene.types);
-  VoxelProperties textured{.name = "textured"};
+  VoxelProperties textured{.name = "textured", .emission = 3.0F};
   textured.faces = render_test::random_faces(5);
   textured.shapes = VoxelShape::box({2, 0, 2}, {14, 12, 14});
   const VoxelType box = *scene.types.add(textured);

@@ -151,15 +151,15 @@ ShaderShapeRecord shape_record(const ShapeModel& model, std::uint16_t number, co
     record.bits |= std::uint32_t{face.look} << kTypeLookShift;
     return record;
   }
+  const VoxelFace& look = model.looks[face.look - std::size_t{6}];
+  record.tint = packed_colour({look.tint.r, look.tint.g, look.tint.b, look.emission_share});
   if (texture == nullptr) {
     record.bits |= kNoLook << kTypeLookShift;
     return record;
   }
-  const VoxelFace& look = model.looks[face.look - std::size_t{6}];
   record.texels = texels;
   record.bits |= kOwnLook | static_cast<std::uint32_t>(texture->level_count() - 1) |
                  static_cast<std::uint32_t>(look.alpha) << kAlphaShift;
-  record.tint = packed_colour(look.tint);
   return record;
 }
 

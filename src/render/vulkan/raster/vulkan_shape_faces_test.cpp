@@ -74,13 +74,15 @@ struct Yard {
     VoxelFace look{.texture = random_texture(32, 7), .turn = 1, .tint = {255, 200, 90}};
     ShapeElement post{.min = {5, 0, 5}, .max = {11, 16, 11}};
     ShapeElement board{.min = {1, 9, 7}, .max = {15, 12, 9}, .turn = ElementTurn{.axis = 0, .degrees = 22.5F}};
+    look.emission_share = 102;
     for (ElementFace& face : post.faces) face.face = look;
     look.mirrored = true;
+    look.emission_share = 255;
     for (ElementFace& face : board.faces) face.face = look;
-    VoxelProperties fence{.name = "textured fence", .emission = 0.25F};
+    VoxelProperties fence{.name = "textured fence", .emission = 0.75F};
     // A look without a texture has the colour of its tint.
     ShapeElement cap{.min = {3, 13, 3}, .max = {13, 15, 13}};
-    for (ElementFace& face : cap.faces) face.face = VoxelFace{.tint = {40, 200, 120}};
+    for (ElementFace& face : cap.faces) face.face = VoxelFace{.tint = {40, 200, 120}, .emission_share = 0};
     fence.shapes = *VoxelShape::from_elements({post, board, cap});
     textured_fence = scene.types.add(fence).value();
     SceneGrid yard;

@@ -79,6 +79,7 @@ constexpr std::uint32_t kSideHasTexels = 1U << 7;
 constexpr std::uint32_t kSideIsGlass = 1U << 8;
 constexpr std::uint32_t kSideIsOnVoxel = 1U << 9;
 constexpr std::uint32_t kSideIsTilted = 1U << 10;
+constexpr std::uint32_t kSideIsLamp = 1U << 11;
 constexpr std::uint32_t kSideDirection = 12;  ///< bits
 
 struct ShaderPlaced {
