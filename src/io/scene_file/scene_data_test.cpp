@@ -444,6 +444,49 @@ std::string error_after(const std::string& from, const std::string& to) {
   return loaded ? "" : loaded.error().message;
 }
 
+TEST(SceneData, KeepsSharesOfEmission) {
+  VoxelProperties type = textured_type();
+  EXPECT_EQ(text_of([&] {
+              Scene scene = scene_of(Grid());
+              EXPECT_TRUE(scene.types.add(type));
+              return scene;
+            }())
+                .find("emission_share"),
+            std::string::npos)
+      << "files without shares stay as they were";
+  std::array<VoxelFace, 6> faces;
+  for (const Direction direction : kDirections) faces[static_cast<std::size_t>(direction)] = type.faces[direction];
+  faces[0].emission_share = 0;
+  faces[4].emission_share = 254;
+  type.faces = VoxelFaces(faces);
+  type.emission = 2.0F;
+  VoxelProperties post{.name = "post", .emission = 1.0F};
+  ShapeElement element;
+  element.faces[2].face = VoxelFace{.tint = {9, 9, 9}, .emission_share = 17};
+  post.shapes = *VoxelShape::from_elements({element});
+  Scene scene = scene_of(Grid());
+  ASSERT_TRUE(scene.types.add(type));
+  ASSERT_TRUE(scene.types.add(post));
+  const std::string text = text_of(scene);
+  EXPECT_NE(text.find("\"quoin_scene\": 11"), std::string::npos);
+  const auto loaded = read(text);
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  for (VoxelType i = 1; i < scene.types.size(); ++i) EXPECT_EQ(loaded->scene.types[i], scene.types[i]);
+  for (const char* wrong : {"256", "-1", "0.5", "\"all\""}) {
+    std::string changed = text;
+    const std::string from = "\"emission_share\":254";
+    changed.replace(changed.find(from), from.size(), std::string("\"emission_share\":") + wrong);
+    const auto refused = read(changed);
+    ASSERT_FALSE(refused) << wrong;
+    EXPECT_EQ(refused.error().message, "types[2].faces.sides[4].emission_share: must be a whole number from 0 to 255");
+  }
+  const TestFolder folder("scene_shares");
+  ASSERT_TRUE(save_scene(scene, folder.file("a.quoin")));
+  const auto world = load_scene(folder.file("a.quoin"));
+  ASSERT_TRUE(world) << to_string(world.error());
+  for (VoxelType i = 1; i < scene.types.size(); ++i) EXPECT_EQ(world->scene.types[i], scene.types[i]);
+}
+
 TEST(SceneData, RefusesInvalidTexturesWithTheirPosition) {
   const std::string faces = "types[0].faces";
   EXPECT_EQ(error_after("\"size\":32", "\"size\":31"),

@@ -222,7 +222,7 @@ constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
 constexpr int kMaxDepth = 32;
 constexpr std::size_t kMaxFiles = 65'536;
 constexpr std::size_t kMaxInstances = std::size_t{1} << 22;
-constexpr int kVersion = 10;
+constexpr int kVersion = 11;
 constexpr std::size_t kMaxPacks = 64;  // of a file
 
 /// Reads the key "path", which names a file.
@@ -319,7 +319,7 @@ void read_file_object(const Json& json, std::size_t file_bytes, Threads threads,
   if (version != nullptr && !version->is_number_unsigned())
     faults.add(file.place_of("quoin_scene"), "must be the version, a whole number");
   if (version != nullptr && version->is_number_unsigned() && (*version < 1 || *version > kVersion)) {
-    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not supported (1 to 10 are)",
+    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not supported (1 to 11 are)",
                ErrorCode::Unsupported);
   }
   scene.types = read_types(file);

@@ -218,10 +218,10 @@ TEST(SceneFile, ErrorsHaveAPosition) {
   }
   EXPECT_EQ(find_error(file_with(R"({"file": "a", "visible": 1})")), "instances[0].visible: must be true or false");
   EXPECT_EQ(find_error(file_with("7")), "instances[0]: must be an object");
-  EXPECT_EQ(find_error(R"({"quoin_scene": 11, "files": [], "instances": []})"),
-            "quoin_scene: version 11 is not supported (1 to 10 are)");
+  EXPECT_EQ(find_error(R"({"quoin_scene": 12, "files": [], "instances": []})"),
+            "quoin_scene: version 12 is not supported (1 to 11 are)");
   EXPECT_EQ(find_error(R"({"quoin_scene": 0, "files": [], "instances": []})"),
-            "quoin_scene: version 0 is not supported (1 to 10 are)");
+            "quoin_scene: version 0 is not supported (1 to 11 are)");
   EXPECT_EQ(find_error(R"({"quoin_scene": 1, "files": []})"), "\"instances\" is missing");
   const auto hierarchy = [](const std::string& lists, const std::string& instance) {
     return R"({"quoin_scene": 4, "files": [{"id": "a", "path": "x"}], )" + lists + R"("instances": [{"file": "a")" +

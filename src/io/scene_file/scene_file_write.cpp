@@ -41,6 +41,9 @@ class SceneText {
         is_ninth_ |= !properties.orientations.empty() || !properties.shapes.empty() ||
                      !(properties.field_textures == FieldTextures{});
         is_tenth_ |= are_of_tenth(properties.shapes);
+        for_each_look(properties, [&](const VoxelFace& look) {
+          is_eleventh_ |= look.emission_share != VoxelFace{}.emission_share;
+        });
       }
       for (std::size_t i = 0; i < scene.grids.size(); ++i) {
         put_grid(scene.grids[i], pieces.voxels[i], pieces.densities[i], pieces.data[i]);
@@ -108,7 +111,8 @@ class SceneText {
     std::string text = "{\n  \"quoin_scene\": ";
     const bool is_tenth =
         is_tenth_ || std::ranges::any_of(scene.sources, [](const auto& source) { return !source.packs.empty(); });
-    text += is_tenth                                                 ? "10"
+    text += is_eleventh_                                             ? "11"
+            : is_tenth                                               ? "10"
             : is_ninth_                                              ? "9"
             : is_eighth_                                             ? "8"
             : is_seventh_                                            ? "7"
@@ -154,6 +158,7 @@ class SceneText {
   bool is_eighth_ = false;
   bool is_ninth_ = false;
   bool is_tenth_ = false;
+  bool is_eleventh_ = false;
 };
 
 Status check_types(const SceneFile& scene) {

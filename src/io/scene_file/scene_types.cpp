@@ -68,6 +68,7 @@ OrderedJson PartWriter::json_of(const VoxelFace& face, TypeTextures& textures, O
   const Rgba8 tint = face.tint;
   if (!(tint == VoxelFace{}.tint)) json["tint"] = {tint.r, tint.g, tint.b, tint.a};
   if (face.alpha != FaceAlpha::Opaque) json["alpha"] = name_of(kFaceAlphas, face.alpha);
+  if (face.emission_share != VoxelFace{}.emission_share) json["emission_share"] = face.emission_share;
   return json;
 }
 
@@ -244,7 +245,7 @@ Texture texture_of(const Json& json, const Place& place, const TexturesOfTypes& 
 // Reads a face. `needs_texture`: a face without a texture has texture 0; else it has none.
 VoxelFace face_of(const Json& json, const Place& place, const std::vector<Texture>& textures, bool needs_texture,
                   Faults& faults) {
-  const Object object(json, place, {"texture", "turn", "mirrored", "tint", "alpha"}, faults);
+  const Object object(json, place, {"texture", "turn", "mirrored", "tint", "alpha", "emission_share"}, faults);
   VoxelFace face;
   const std::size_t texture = small_number(object, "texture", kMostTextures - 1, 0);
   if (!needs_texture && object.find("texture") == nullptr) {
@@ -262,6 +263,7 @@ VoxelFace face_of(const Json& json, const Place& place, const std::vector<Textur
     face.tint = {channel(0), channel(1), channel(2), channel(3)};
   }
   read_name(object, "alpha", kFaceAlphas, face.alpha);
+  face.emission_share = static_cast<std::uint8_t>(small_number(object, "emission_share", 255, face.emission_share));
   return face;
 }
 
