@@ -548,6 +548,30 @@ TEST_F(CTextures, GiveMeshesOfShapesTheirOwnLooks) {
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
+TEST_F(CTextures, KeepSharesOfEmission) {
+  faces_[2].has_emission_share = 1;
+  faces_[2].emission_share = 0;
+  faces_[3].has_emission_share = 1;
+  faces_[3].emission_share = 90;
+  faces_[4].emission_share = 7;  // without effect
+  ASSERT_EQ(quoin_type_set_faces(scene_, 1, faces_.data()), QUOIN_OK) << quoin_last_error();
+  const quoin_textures all = textures(1);
+  std::array<quoin_face, 6> read{};
+  for (quoin_face& face : read) face.size = sizeof face;
+  std::size_t count = read.size();
+  ASSERT_EQ(quoin_textures_faces(all, 1, read.data(), &count), QUOIN_OK) << quoin_last_error();
+  for (std::size_t i = 0; i < read.size(); ++i) {
+    EXPECT_EQ(read[i].has_emission_share, i == 2 || i == 3 ? 1 : 0);
+    EXPECT_EQ(read[i].emission_share, i == 2 ? 0 : i == 3 ? 90 : 255);
+  }
+  EXPECT_EQ(quoin_free(all), QUOIN_OK);
+  for (const int wrong : {-1, 256}) {
+    faces_[2].emission_share = wrong;
+    EXPECT_EQ(quoin_type_set_faces(scene_, 1, faces_.data()), QUOIN_INVALID_ARGUMENT);
+    EXPECT_STREQ(quoin_last_error(), "the emission_share of a face must be 0 to 255");
+  }
+}
+
 TEST_F(CTextures, GiveTypesTheirMeanColour) {
   auto type = sized<quoin_type>();
   std::vector<std::uint8_t> half = texels(16, 0);

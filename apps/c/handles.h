@@ -69,6 +69,7 @@ struct GridMesh {
   std::vector<std::uint32_t> textures;
   std::vector<std::array<float, 2>> texture_uvs;
   std::vector<Rgba8> tints;
+  std::vector<std::uint8_t> emission_shares;
 };
 struct LabelMesh {
   LabelSurfaces surfaces;

@@ -119,6 +119,8 @@ void add_textures(const MeshView& view, std::size_t at, const SceneMeshes& meshe
   write_attribute(VertexAttribute::Tint, VertexFormat::Unorm8x4Srgb, view, meshes, textures, tints);
   for (std::size_t i = 0; i < count; ++i) {
     if (numbers[i] == QUOIN_NO_TEXTURE) tints[i] = mesh.colours[at + i];  // opaque, if its type is
+    const VoxelFace* const face = face_at(view, i, meshes.types);
+    if (face != nullptr) mesh.emission_shares[at + i] = face->emission_share;
   }
 }
 
@@ -144,6 +146,7 @@ Result<GridMesh> put_together(const SceneMeshes& meshes, const TextureSet* textu
     mesh.textures.assign(vertices, QUOIN_NO_TEXTURE);
     mesh.texture_uvs.resize(vertices);
     mesh.tints.resize(vertices);
+    mesh.emission_shares.resize(vertices, VoxelFace{}.emission_share);
   }
   const std::vector<Rgba8> palette = palette_of(meshes.types);
   std::uint32_t* next = mesh.indices.data();
@@ -210,6 +213,7 @@ void show(const GridMesh& mesh, quoin_mesh_data& data) {
     data.textures = mesh.textures.data();
     data.texture_uvs = mesh.texture_uvs.front().data();
     data.tints = reinterpret_cast<const std::uint8_t*>(mesh.tints.data());
+    data.emission_shares = mesh.emission_shares.data();
   }
   data.indices = mesh.indices.data();
 }

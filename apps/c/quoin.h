@@ -122,15 +122,18 @@ enum {
  * its top at +Z. */
 typedef struct quoin_face {
   size_t size;
-  char name[128];      /* of the texture; UTF-8, truncated if longer */
-  const uint8_t* rgba; /* [texels][texels][4]: rows from the top, sRGB with linear alpha, not premultiplied */
-  int32_t texels;      /* per side of the texture: 16, 32, 64, 128, 256, 512 or 1,024 */
-  int32_t turn;        /* clockwise quarter turns for a viewer outside, 0 to 3 */
-  int32_t mirrored;    /* 1: exchanges left and right, before the turn */
-  int32_t alpha;       /* QUOIN_FACE_... */
-  int32_t has_tint;    /* 0: white */
-  uint8_t tint[4];     /* sRGB; multiplies the texture in linear light. The fourth number has no effect */
-  uint32_t texture;    /* output of quoin_textures_faces: the number of its texture, layer + 65,536 * array */
+  char name[128];             /* of the texture; UTF-8, truncated if longer */
+  const uint8_t* rgba;        /* [texels][texels][4]: rows from the top, sRGB with linear alpha, not premultiplied */
+  int32_t texels;             /* per side of the texture: 16, 32, 64, 128, 256, 512 or 1,024 */
+  int32_t turn;               /* clockwise quarter turns for a viewer outside, 0 to 3 */
+  int32_t mirrored;           /* 1: exchanges left and right, before the turn */
+  int32_t alpha;              /* QUOIN_FACE_... */
+  int32_t has_tint;           /* 0: white */
+  uint8_t tint[4];            /* sRGB; multiplies the texture in linear light. The fourth number has no effect */
+  uint32_t texture;           /* output of quoin_textures_faces: the number of its texture, layer + 65,536 * array */
+  int32_t reserved;           /* ignored; was padding in earlier versions */
+  int32_t has_emission_share; /* 0: the face has all of the type's emission */
+  int32_t emission_share;     /* its share of the type's emission, in 255ths: 0 none, 255 all */
 } quoin_face;
 
 /* Textures of one size, for a device's texture array. */
@@ -364,6 +367,7 @@ typedef struct quoin_mesh_data {
   const uint32_t* textures; /* [vertex_count]: numbers as in quoin_face; QUOIN_NO_TEXTURE: the tint is the colour */
   const float* texture_uvs; /* [vertex_count][2]: rightwards and downwards, 1 per voxel; the texture repeats */
   const uint8_t* tints;     /* [vertex_count][4], sRGB */
+  const uint8_t* emission_shares; /* [vertex_count]: the face's share of its type's emission, in 255ths */
 } quoin_mesh_data;
 
 typedef struct quoin_mesh_options {

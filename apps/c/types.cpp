@@ -33,6 +33,8 @@ const char* validate_face(const quoin_face& face) {
   if (face.turn < 0 || face.turn > 3) return "the turn of a face must be 0 to 3";
   if (face.alpha < QUOIN_FACE_OPAQUE || face.alpha > QUOIN_FACE_TRANSLUCENT)
     return "the alpha of a face is not a QUOIN_FACE value";
+  if (face.has_emission_share != 0 && (face.emission_share < 0 || face.emission_share > 255))
+    return "the emission_share of a face must be 0 to 255";
   return nullptr;
 }
 
@@ -68,6 +70,7 @@ Result<VoxelFace> face_of(const quoin_face& given, Texels texels) {
   face.mirrored = given.mirrored != 0;
   face.alpha = static_cast<FaceAlpha>(given.alpha);
   if (given.has_tint != 0) face.tint = {given.tint[0], given.tint[1], given.tint[2], 255};
+  if (given.has_emission_share != 0) face.emission_share = static_cast<std::uint8_t>(given.emission_share);
   return face;
 }
 
@@ -115,6 +118,8 @@ quoin_face described(const VoxelFace& face, const TextureSet& set) {
   made.has_tint = face.tint.r == 255 && face.tint.g == 255 && face.tint.b == 255 ? 0 : 1;
   const std::uint8_t tint[] = {face.tint.r, face.tint.g, face.tint.b, 255};
   std::memcpy(made.tint, tint, sizeof tint);
+  made.has_emission_share = face.emission_share == VoxelFace{}.emission_share ? 0 : 1;
+  made.emission_share = face.emission_share;
   made.texture = QUOIN_NO_TEXTURE;
   if (face.texture.is_null()) return made;
   copy_text(face.texture.name(), made.name);

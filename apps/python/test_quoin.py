@@ -660,6 +660,29 @@ class Textures(unittest.TestCase):
         scene.set_faces(2, quoin.Face(self.glass[:, ::-1], alpha="translucent"))
         return scene
 
+    def test_shares_of_emission_are_kept(self):
+        scene = self.scene()
+        bright = quoin.Face(self.stone, "stone")
+        dark = bright._replace(emission_share=0)
+        scene.set_faces(1, (dark, bright, dark._replace(emission_share=90)))
+        self.assertEqual([one.emission_share for one in scene.textures().faces(1)], [0, 0, 255, 90, 0, 0])
+        mesh = scene.grids[0].mesh()
+        top = mesh.normals[:, 1] > 0.5
+        self.assertTrue((mesh.emission_shares[top & (mesh.types == 1)] == 255).all())
+        self.assertTrue((mesh.emission_shares[(mesh.normals[:, 2] > 0.5) & (mesh.types == 1)] == 0).all())
+        tint = quoin.Face(None, tint=(1, 2, 3), emission_share=7)
+        box = quoin.Element(looks={"+X": tint, "-X": (1, 2, 3), "+Y": dark})
+        scene.set_shapes(2, quoin.Shapes((quoin.ShapePart((box,)),)))
+        looks = scene.textures().shapes(2).parts[0].elements[0].looks
+        self.assertEqual((looks["+X"].image, looks["+X"].tint, looks["+X"].emission_share), (None, (1, 2, 3), 7))
+        self.assertEqual(looks["-X"], (1, 2, 3))
+        self.assertEqual(looks["+Y"].emission_share, 0)
+        for wrong in (-1, 256, 0.5):
+            with self.assertRaises((ValueError, TypeError, quoin.QuoinError)):
+                scene.set_faces(1, bright._replace(emission_share=wrong))
+        with self.assertRaises(TypeError):
+            scene.set_faces(1, bright._replace(image=None))
+
     def test_of_types_are_read_back(self):
         textures = self.scene().textures()
         self.assertIsNone(textures.faces(0))

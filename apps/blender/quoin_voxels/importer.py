@@ -26,11 +26,12 @@ _NO_TEXTURE = 2**32 - 1
 
 
 def _faces_of(form):
-    """Returns the textured faces of a type and its shapes, by texture and tint."""
+    """Returns the textured faces of a type and its shapes, by texture, tint and share of emission."""
     faces = list(form.faces or ())
     for part in form.shapes.parts if form.shapes else ():
         faces += [look for element in part.elements for look in element.looks.values() if isinstance(look, quoin.Face)]
-    return {(one.texture, tuple(one.tint)): one for one in reversed(faces)}
+    return {(one.texture, tuple(one.tint), one.emission_share): one for one in reversed(faces)
+            if one.image is not None}
 
 
 class _Looks:
@@ -43,7 +44,7 @@ class _Looks:
         self.forms = [kept.Form(self.textures.faces(i), self.textures.shapes(i), scene.orientations(i))
                       for i in range(len(types))]
         self.is_shaped = np.array([one.shapes is not None for one in self.forms])
-        self._faces = [_faces_of(one) for one in self.forms]  # of each type, by texture and tint
+        self._faces = [_faces_of(one) for one in self.forms]  # of each type, see _faces_of
         self._rows, self._of_rows, self._of_faces, self._images = [], {}, {}, {}
         self.group = materials.occlusion_group(options.occlusion)
         is_palette = options.materials == "PALETTE" or (
@@ -63,32 +64,40 @@ class _Looks:
             self._of[number] = materials.of_type(one, number, self.group, self.scale)
         return self._of[number]
 
-    def numbers_of(self, types, textures, tints, is_one_sided):
-        """Returns numbers for `of`: the types, and other numbers for faces with a texture, or with a colour that is not
-        the type's. `is_one_sided`: of faces that are seen from their front only."""
+    def numbers_of(self, types, textures, tints, shares, is_one_sided):
+        """Returns numbers for `of`: the types, and other numbers for faces with a texture, or with a colour or share of
+        emission that is not the type's. `is_one_sided`: of faces that are seen from their front only."""
         colours = np.array([one.rgba[:3] for one in self.types], np.uint8)
-        is_own = (textures != _NO_TEXTURE) | (tints[:, :3] != colours[types]).any(1)
+        # Without emission, shares make no difference.
+        emits = np.array([one.emission > 0.0 for one in self.types])
+        shares = np.where(emits[types], shares, 255)
+        is_own = (textures != _NO_TEXTURE) | (tints[:, :3] != colours[types]).any(1) | (shares != 255)
         found = types.copy()
         if is_own.any():
             kinds, kind = np.unique(textures[is_own], return_inverse=True)
             red, green, blue = tints[is_own, :3].astype(np.int64).T
             packed = (types[is_own] * len(kinds) + kind) << 25 | is_one_sided[is_own] << 24
             packed |= red << 16 | green << 8 | blue
+            packed = packed << 8 | shares[is_own]
             packed, row = np.unique(packed, return_inverse=True)
             numbers = []
-            for each in packed.tolist():
+            for both in packed.tolist():
+                each, share = divmod(both, 256)
                 number, kind = divmod(each >> 25, len(kinds))
                 tint = (each >> 16 & 255, each >> 8 & 255, each & 255)
-                key = (number, int(kinds[kind]), tint, bool(each >> 24 & 1))
+                key = (number, int(kinds[kind]), tint, share, bool(each >> 24 & 1))
                 numbers.append(self._of_rows.setdefault(key, len(self.types) + len(self._rows)))
                 if numbers[-1] == len(self.types) + len(self._rows):
                     self._rows.append(key)
             found[is_own] = np.array(numbers)[row]
         return found
 
-    def _of_row(self, number, texture, tint, is_one_sided):
+    def _of_row(self, number, texture, tint, share, is_one_sided):
         one = self.types[number]
-        face = self._faces[number].get((texture, tint))
+        one = one._replace(emission=one.emission * share / 255.0)
+        face = self._faces[number].get((texture, tint, share))
+        if face is None and share == 255:  # of a type without emission, whose shares were not compared
+            face = next((found for key, found in self._faces[number].items() if key[:2] == (texture, tint)), None)
         if face is None:  # a colour
             key = (tint, *one[2:])
             if key not in self._of_faces:
@@ -235,7 +244,8 @@ def mesh_of(grid, name, looks, options):
     face_types = np.zeros(0, np.int64) if blocks == 0 else found.types[:blocks:4].astype(np.int64)
     face_looks = face_types
     if found.textures is not None:
-        face_looks = looks.numbers_of(face_types, found.textures[:blocks:4], found.tints[:blocks:4], twins)
+        face_looks = looks.numbers_of(face_types, found.textures[:blocks:4], found.tints[:blocks:4],
+                                      found.emission_shares[:blocks:4], twins)
     slots = _slots(mesh, looks, face_looks, faces)
     if found.textures is not None:
         layer = mesh.uv_layers.new(name=materials.TEXTURE, do_init=False)

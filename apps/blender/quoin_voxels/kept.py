@@ -63,11 +63,13 @@ class _Images:
 
     def pack(self, face):
         """Returns a face for JSON."""
-        texels = face.image.tobytes()
-        if texels not in self.numbers:
-            self.numbers[texels] = len(self.all)
-            self.all.append(texels)
-        return [self.numbers[texels], *face[1:6]]
+        number = -1  # a colour
+        if face.image is not None:
+            texels = face.image.tobytes()
+            number = self.numbers.setdefault(texels, len(self.all))
+            if number == len(self.all):
+                self.all.append(texels)
+        return [number, *face[1:6], face.emission_share]
 
 
 def _pack_element(one, images):
@@ -103,7 +105,9 @@ def _tuples(value):
 
 
 def _unpack_face(row, images):
-    return quoin.Face(images[row[0]], row[1], row[2], row[3], tuple(row[4]), row[5])
+    share = row[6] if len(row) > 6 else 255  # absent in older files
+    return quoin.Face(images[row[0]] if row[0] >= 0 else None, row[1], row[2], row[3], tuple(row[4]), row[5],
+                      emission_share=share)
 
 
 def _unpack_look(look, images):

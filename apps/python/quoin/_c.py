@@ -81,7 +81,8 @@ class Face(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("name", ctypes.c_char * 128), ("rgba", ctypes.c_void_p),
                 ("texels", ctypes.c_int32), ("turn", ctypes.c_int32), ("mirrored", ctypes.c_int32),
                 ("alpha", ctypes.c_int32), ("has_tint", ctypes.c_int32), ("tint", ctypes.c_uint8 * 4),
-                ("texture", ctypes.c_uint32)]
+                ("texture", ctypes.c_uint32), ("reserved", ctypes.c_int32), ("has_emission_share", ctypes.c_int32),
+                ("emission_share", ctypes.c_int32)]
 
 
 class TextureArray(ctypes.Structure):
@@ -197,7 +198,8 @@ class MeshData(ctypes.Structure):
                 ("interface_count", ctypes.c_size_t), ("positions", ctypes.c_void_p), ("normals", ctypes.c_void_p),
                 ("colours", ctypes.c_void_p), ("occlusion", ctypes.c_void_p), ("indices", ctypes.c_void_p),
                 ("interfaces", ctypes.c_void_p), ("types", ctypes.c_void_p), ("textures", ctypes.c_void_p),
-                ("texture_uvs", ctypes.c_void_p), ("tints", ctypes.c_void_p)]
+                ("texture_uvs", ctypes.c_void_p), ("tints", ctypes.c_void_p),
+                ("emission_shares", ctypes.c_void_p)]
 
 
 class MeshOptions(ctypes.Structure):

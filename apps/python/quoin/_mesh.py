@@ -34,6 +34,8 @@ class Mesh:
     #: float32, (vertices, 2), with `textures`: rightwards and downwards, 1 per voxel; the texture repeats
     texture_uvs: Optional[NdArray]
     tints: Optional[NdArray]  #: uint8, (vertices, 4), with `textures`: sRGB, multiplies the texture in linear light
+    #: uint8, (vertices,), with `textures`: the face's share of its type's emission, in 255ths
+    emission_shares: Optional[NdArray]
     interfaces: Optional[NdArray]  #: int64, (n, 4); only for labels; see `mesh_labels`
 
     def __init__(self, owner: _c.Owner) -> None:
@@ -57,6 +59,7 @@ class Mesh:
         self.textures = view(data.textures, (n,), np.uint32)
         self.texture_uvs = view(data.texture_uvs, (n, 2), np.float32)
         self.tints = view(data.tints, (n, 4), np.uint8)
+        self.emission_shares = view(data.emission_shares, (n,), np.uint8)
         self.interfaces = view(data.interfaces, (data.interface_count, 4), np.int64)
 
     def __repr__(self) -> str:

@@ -26,13 +26,16 @@ class Face(NamedTuple):
     +Z and its top at +X; on -Y its right is at +X and its top at +Z.
     """
 
-    image: NdArray  #: uint8, (size, size, 4) or (size, size, 3), rows from the top: sRGB with linear alpha
+    #: uint8, (size, size, 4) or (size, size, 3), rows from the top: sRGB with linear alpha. None, for looks of shapes:
+    #: the colour `tint`
+    image: Optional[NdArray]
     name: str = ""  #: of the texture
     turn: int = 0  #: clockwise quarter turns for a viewer outside, 0 to 3
     mirrored: bool = False  #: exchanges left and right, before the turn
     tint: Tuple[int, ...] = (255, 255, 255)  #: sRGB; multiplies the texture in linear light
     alpha: str = "opaque"  #: "opaque", "cutout" (texels are visible or not) or "translucent"
     texture: Optional[int] = None  #: result of `Textures.faces`: the number in `Mesh.textures`
+    emission_share: int = 255  #: share of the type's emission, in 255ths: 0 none, 255 all
 
 
 Look = Union[Face, Tuple[int, ...], None]
@@ -209,7 +212,7 @@ class Textures:
             (_c.ShapeCondition, whole.condition_count), (_c.Face, whole.look_count)))
         _c.check(_c.lib.quoin_textures_read_shapes(self._owner.handle, number, parts or None, elements or None,
                                                    conditions or None, looks or None))
-        seen: List[Look] = [_face_of(one, self._owner) if one.rgba else tuple(one.tint)[:3] for one in looks]
+        seen = [_look_of(one, self._owner) for one in looks]
         boxes, rules = iter([_element_of(one, seen) for one in elements]), iter(map(_condition_of, conditions))
         made = tuple(ShapePart(tuple(next(boxes) for _ in range(one.element_count)), one.orientation,
                                tuple(next(rules) for _ in range(one.condition_count))) for one in parts)
@@ -223,10 +226,13 @@ def _room(structure: Any, count: int) -> Any:
 
 
 def _face_of(one: Any, owner: _c.Owner) -> Face:
-    image = _c.view_of(owner, one.rgba, (one.texels, one.texels, 4), np.dtype(np.uint8))
-    assert image is not None
+    image = _c.view_of(owner, one.rgba, (one.texels, one.texels, 4), np.dtype(np.uint8)) if one.rgba else None
     return Face(image, _c.text_of(one.name), one.turn, bool(one.mirrored), tuple(one.tint)[:3], _ALPHAS[one.alpha],
-                one.texture if one.texture != _c.NO_TEXTURE else None)
+                one.texture if one.texture != _c.NO_TEXTURE else None, one.emission_share)
+
+
+def _look_of(one: Any, owner: _c.Owner) -> Look:
+    return _face_of(one, owner) if one.rgba or one.has_emission_share else tuple(one.tint)[:3]
 
 
 def faces_struct(faces: Union[Face, Sequence[Face]]) -> Any:
@@ -242,11 +248,13 @@ def faces_struct(faces: Union[Face, Sequence[Face]]) -> Any:
     if len(given) != 6:
         raise ValueError(f"there must be 1, 3 or 6 faces, not {len(given)}")
     structs: Any = (_c.Face * 6)()
-    structs.kept = [_fill(struct, face) for struct, face in zip(structs, given)]  # keeps the images alive
+    structs.kept = [_fill_image(struct, face) for struct, face in zip(structs, given)]  # keeps the images alive
+    for struct, face in zip(structs, given):
+        _fill(struct, face)
     return structs
 
 
-def _fill(struct: Any, face: Face) -> NdArray:
+def _fill_image(struct: Any, face: Face) -> NdArray:
     image = face.image
     if not isinstance(image, np.ndarray):
         raise TypeError("the image of a face must be a NumPy array")
@@ -255,6 +263,11 @@ def _fill(struct: Any, face: Face) -> NdArray:
     if image.shape[2] == 3:
         image = np.dstack([image, np.full(image.shape[:2], 255, np.uint8)])
     image = np.ascontiguousarray(image)
+    struct.rgba, struct.texels = image.ctypes.data, image.shape[0]
+    return image
+
+
+def _fill(struct: Any, face: Face) -> None:
     if face.alpha not in _ALPHAS:
         raise ValueError(f"alpha must be one of {', '.join(_ALPHAS)}, not {face.alpha!r}")
     tint = [_c.whole(v, "a tint", 0, 255) for v in face.tint]
@@ -262,11 +275,10 @@ def _fill(struct: Any, face: Face) -> NdArray:
         raise ValueError("a tint must be three or four numbers")
     struct.size = ctypes.sizeof(_c.Face)
     struct.name = _c.bytes_of(face.name)
-    struct.rgba, struct.texels = image.ctypes.data, image.shape[0]
     struct.turn, struct.mirrored = _c.whole(face.turn, "turn"), int(face.mirrored)
     struct.alpha = _ALPHAS.index(face.alpha)
     struct.has_tint, struct.tint[:] = 1, (tint + [255])[:4]
-    return image
+    struct.has_emission_share, struct.emission_share = 1, _c.whole(face.emission_share, "emission_share", 0, 255)
 
 
 def _number_of(name: Any, names: Sequence[Any], label: str) -> int:
@@ -308,11 +320,15 @@ class _Looks:
     def number_of(self, look: Any) -> int:
         if look is None:
             return -1
-        key: Any = (id(look.image), *look[1:4], tuple(look.tint), look.alpha) if isinstance(look, Face) else tuple(look)
+        key: Any = tuple(look)
+        if isinstance(look, Face):
+            key = (id(look.image), *look[1:4], tuple(look.tint), look.alpha, look.emission_share)
         if key not in self._numbers:
             struct = _c.sized(_c.Face)
             if isinstance(look, Face):
-                self.kept += [look.image, _fill(struct, look)]
+                if look.image is not None:
+                    self.kept += [look.image, _fill_image(struct, look)]
+                _fill(struct, look)
             else:
                 colour = [_c.whole(v, "a colour", 0, 255) for v in look]
                 if len(colour) not in (3, 4):
