@@ -263,13 +263,16 @@ bool Surfaces::update(const VoxelRegistry& types) {
     fluids_[type] = types.first_fluid(types.fluid_groups(static_cast<VoxelType>(type)));
   }
   has_textures_ = types.has_textures();
-  has_textured_glass_ = has_cells_of_faces_ = false;
+  has_textured_glass_ = has_cells_of_faces_ = has_tinted_cells_ = false;
   for (std::size_t type = 0; type < faces_.size(); ++type) {
     if (faces_[type] == nullptr) continue;
     const CellContent content = faces_[type]->content;
     has_textured_glass_ |= content == CellContent::TexturedGlass;
     // Types with shapes are never such cells.
-    has_cells_of_faces_ |= content == CellContent::Faces && !types.is_shaped(static_cast<VoxelType>(type));
+    if (content != CellContent::Faces || types.is_shaped(static_cast<VoxelType>(type))) continue;
+    has_cells_of_faces_ = true;
+    has_tinted_cells_ |= std::ranges::any_of(
+        faces_[type]->sides, [](const FaceTexels& side) { return side.alpha == FaceAlpha::Translucent; });
   }
   changes.commit();
   return true;

@@ -187,10 +187,12 @@ class Surfaces {
   [[nodiscard]] std::span<const std::shared_ptr<const TypeFaces>> all_faces() const { return faces_; }
   /// Returns true if any type has textures.
   [[nodiscard]] bool has_textures() const { return has_textures_; }
-  /// Returns true if any type has textured glass or cells of faces.
-  [[nodiscard]] bool has_textured_cells() const { return has_textured_glass_ || has_cells_of_faces_; }
+  /// Returns true if any type has textured glass.
+  [[nodiscard]] bool has_textured_glass() const { return has_textured_glass_; }
   /// Returns true if any type has cells of faces.
   [[nodiscard]] bool has_cells_of_faces() const { return has_cells_of_faces_; }
+  /// Returns true if any such type has a translucent face, which tints light.
+  [[nodiscard]] bool has_tinted_cells() const { return has_tinted_cells_; }
   /// Returns true if a type hides the faces of its neighbours: cubes all of them, shapes those that they cover.
   /// Unregistered ids do.
   [[nodiscard]] bool is_opaque(VoxelType type) const {
@@ -228,6 +230,7 @@ class Surfaces {
   bool has_textures_ = false;
   bool has_textured_glass_ = false;
   bool has_cells_of_faces_ = false;
+  bool has_tinted_cells_ = false;
   std::vector<glm::vec4> shape_means_;  // colour, emission; empty without shapes
   std::vector<VoxelType> fluids_;       // see `fluid`; empty without fluids
 };

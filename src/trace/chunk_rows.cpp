@@ -135,6 +135,23 @@ void find_uniform_blocks(const Chunk& chunk, const VoxelRegistry& types, const C
   }
 }
 
+void split_blocks(std::span<const std::uint64_t> listed, UniformBlocks& blocks) {
+  QUOIN_ASSERT(listed.empty() || listed.size() == std::size_t{kChunkEdge} * kChunkEdge, "a row for each y and z");
+  for (std::size_t i = 0; i < listed.size(); ++i) {
+    if (listed[i] == 0) continue;
+    const std::size_t y = i % kChunkEdge;
+    const std::size_t z = i / kChunkEdge;
+    for (std::size_t x = 0; x < 16; ++x) {
+      if ((listed[i] >> (4 * x) & 15U) == 0) continue;
+      const std::size_t brick = x / 4 + 4 * (y / 16) + 16 * (z / 16);
+      const std::size_t cell = x % 4 + 4 * (y / 4 % 4) + 16 * (z / 4 % 4);
+      blocks.cells[brick] &= ~(std::uint64_t{1} << cell);
+      blocks.bricks &= ~(std::uint64_t{1} << brick);
+    }
+    blocks.is_whole = false;
+  }
+}
+
 void transpose_nibbles(SlabRows& w) {
   constexpr std::uint64_t kMasks[] = {0x0F0F'0F0F'0F0F'0F0FU, 0x00FF'00FF'00FF'00FFU, 0x0000'FFFF'0000'FFFFU,
                                       0x0000'0000'FFFF'FFFFU};

@@ -176,6 +176,9 @@ void find_uniform_blocks(const Chunk& chunk, const VoxelRegistry& types, const C
 void find_uniform_blocks(const Chunk& chunk, const VoxelRegistry& types, std::span<const std::uint64_t> listed,
                          UniformBlocks& blocks);
 
+/// Leaves out the blocks that contain a listed voxel: rows along x by y + 64 z; no rows: none.
+void split_blocks(std::span<const std::uint64_t> listed, UniformBlocks& blocks);
+
 /// Four adjacent bricks along x, at (y, z) of a chunk, multiples of 16.
 struct BrickRow {
   std::array<Node, 4> bricks{};

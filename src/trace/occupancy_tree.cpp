@@ -454,6 +454,30 @@ struct OccupancyTree::Impl {
         chunk, [&](trace::UniformBlocks& blocks) { trace::find_uniform_blocks(*voxels, types, cubes, blocks); });
     return changed;
   }
+  // As above, also with voxels that shapes touch (OccupancyTree::GlassOfChunk).
+  std::uint64_t put(const Chunk* voxels, const VoxelRegistry& types, IVec3 chunk,
+                    const FunctionRef<bool(VoxelType)>& counts, const GlassOfChunk& glass) {
+    static const Chunk air;
+    const trace::ChunkRows rows(voxels == nullptr ? air : *voxels, counts);
+    if (rows.none() && glass.cubes.empty() && glass.touched.empty()) return drop(chunk);
+    BlockVector<std::uint64_t> listed(std::size_t{kChunkEdge} * kChunkEdge);
+    for (const std::span<const std::uint64_t> each : {glass.cubes, glass.touched}) {
+      for (std::size_t i = 0; i < each.size(); ++i) listed[i] |= each[i];
+    }
+    using Rows = trace::ListedChunkRows;
+    const std::uint64_t changed = put(Rows(rows, listed, Rows::Join::Either), chunk);
+    set_uniform_blocks(chunk, [&](trace::UniformBlocks& blocks) {
+      blocks = {};
+      if (voxels == nullptr || (rows.none() && glass.cubes.empty())) return;
+      if (glass.cubes.empty()) {
+        trace::find_uniform_blocks(*voxels, types, ChunkSlabs::all(), blocks);
+      } else {
+        trace::find_uniform_blocks(*voxels, types, glass.cubes, blocks);
+      }
+      trace::split_blocks(glass.touched, blocks);
+    });
+    return changed;
+  }
   // Returns the wanted slabs that contain voxels, and all wanted slabs in rows with changed bricks. The uniform
   // blocks of other slabs cannot have changed.
   static ChunkSlabs with_any(const ChunkNode& node, std::uint64_t changed, const ChunkSlabs& wanted) {
@@ -818,6 +842,18 @@ void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, std::sp
   changed.reserve(chunks.size());
   for (const IVec3 chunk : chunks) {
     changed.push_back({chunk, impl_->put(grid.find_chunk(chunk), types, chunk, cubes_in(chunk))});
+  }
+  finish_update(changed);
+}
+
+void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, std::span<const IVec3> chunks,
+                           const FunctionRef<bool(VoxelType)>& counts,
+                           const FunctionRef<GlassOfChunk(IVec3 chunk)>& glass_in) {
+  QUOIN_ASSERT(impl_ != nullptr && impl_->which == Occupancy::Glass, "a tree of glass that was not moved from");
+  std::vector<ChunkBricks> changed;
+  changed.reserve(chunks.size());
+  for (const IVec3 chunk : chunks) {
+    changed.push_back({chunk, impl_->put(grid.find_chunk(chunk), types, chunk, counts, glass_in(chunk))});
   }
   finish_update(changed);
 }

@@ -104,12 +104,19 @@ class Walk {
   /// than `largest()`; else the voxel. After `find` was true, in a tree of transparent voxels.
   template <class Largest>
   void leave_block(const Largest& largest) {
-    int size = uniform_size();
+    leave_block(block_size(), largest);
+  }
+  /// As above, with the result of `block_size`.
+  template <class Largest>
+  void leave_block(int size, const Largest& largest) {
     if (size == 1) return step_voxel();
     const double most = largest();
     while (size > 1 && size > most) size /= 4;
     step(size);
   }
+  /// Returns the edge length of the largest aligned block around the voxel that is known to be full of one type. After
+  /// `find` was true, in a tree of transparent voxels.
+  [[nodiscard]] int block_size() const { return uniform_size(); }
   [[nodiscard]] bool is_within(double max_t) const {
     return t_ <= max_t && voxel_[axis_] >= bounds_.min[axis_] && voxel_[axis_] < bounds_.max[axis_];
   }
@@ -325,12 +332,9 @@ struct WalkSpan : VoxelSpan {
 };
 
 /// Calls `visit` with a WalkSpan for each block that `leave` crosses, starting at an occupied voxel, until it returns
-/// false. `leave` gets the walk and the beginning of its span.
+/// false. `leave` gets the walk and the beginning of its span. `walk`: of the ray, where it begins.
 template <class Leave, class Visit>
-void visit_spans(const OccupancyTree& tree, const Ray& ray, double max_t, const Leave& leave, const Visit& visit) {
-  if (!is_usable(ray, max_t)) return;
-  Walk walk(tree, ray);
-  if (!walk.enter(tree.bounds(), max_t)) return;
+void visit_spans(Walk& walk, const Ray& ray, double max_t, const Leave& leave, const Visit& visit) {
   while (walk.find(max_t)) {
     WalkSpan span{{walk.voxel(), face_of(walk, ray), walk.t(), 0.0, walk.axis() < 0}};
     leave(walk, span);
@@ -339,6 +343,13 @@ void visit_spans(const OccupancyTree& tree, const Ray& ray, double max_t, const 
     span.exit_face = static_cast<Direction>(static_cast<int>(face_of(walk, ray)) ^ 1);
     if (!visit(span) || !walk.is_within(max_t)) return;
   }
+}
+/// As above, from where the ray enters the tree.
+template <class Leave, class Visit>
+void visit_spans(const OccupancyTree& tree, const Ray& ray, double max_t, const Leave& leave, const Visit& visit) {
+  if (!is_usable(ray, max_t)) return;
+  Walk walk(tree, ray);
+  if (walk.enter(tree.bounds(), max_t)) visit_spans(walk, ray, max_t, leave, visit);
 }
 
 /// Like `visit_hits`, for a tree of transparent voxels, but visits whole blocks of voxels of one type: a span covers a

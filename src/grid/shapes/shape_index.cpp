@@ -541,10 +541,20 @@ std::shared_ptr<const ShapeIndex::ChunkShapes> ShapeIndex::made(const Grid& grid
   const NearVoxels voxels{near};
   const SurroundingsFinder finder(voxels, types.registry);
   std::array<VoxelType, kChunkEdge> row;
+  // Most voxels of water have the model of the voxel before.
+  const ShapeModel* last = nullptr;
+  VoxelType last_type = kAir;
+  bool is_last_cube = false;
+  const auto is_cube = [&](const ShapeModel& model, VoxelType type) {
+    if (&model != last || type != last_type) is_last_cube = quoin::is_cube(model, types.registry[type].faces);
+    last = &model;
+    last_type = type;
+    return is_last_cube;
+  };
   const auto add = [&](IVec3 local, VoxelType type) {
     const ShapeModel& model = *finder.model(local, type);
     const Types::Kind kind = types.kinds[type];
-    if (kind == Types::Kind::Glass && quoin::is_cube(model, types.registry[type].faces)) {
+    if (kind == Types::Kind::Glass && is_cube(model, type)) {
       if (kWholeChunk.contains(local)) lists.add_cube(local);
       return;
     }

@@ -36,6 +36,12 @@ namespace quoin {
 namespace {
 
 constexpr int kBlock = CameraRays::kBlock;
+// Light that passes less than this share is not seen: a sixteenth of the smallest step of an 8-bit image.
+constexpr float kUnseen = 1.6e-5F;
+
+bool is_unseen(Vec3 passed) {
+  return std::max(std::max(passed.x, passed.y), passed.z) < kUnseen;
+}
 
 // The data shared by all tiles of an image.
 struct TileContext {
@@ -70,7 +76,8 @@ class Tile {
 
   void take_sample(int sample);
   void take_block(int x, int y, const RayPacket& rays, int sample);
-  [[nodiscard]] std::uint32_t lanes_through_glass(const RayPacket& rays, const SceneHits& hits) const;
+  // Finds the transparent content in front of the hits. Returns the rays that may meet some.
+  [[nodiscard]] std::uint32_t find_through(const RayPacket& rays, const SceneHits& hits);
   void add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight);
   // The effect of glass on a ray.
   struct Sight {
@@ -80,7 +87,7 @@ class Tile {
   };
   // Adds the transparent content visible before `max_t`, without the reflections of its surfaces.
   // Not inlined: the loop over pixels stays small.
-  __attribute__((noinline)) Sight add_transparent(const Ray& ray, double max_t, std::size_t pixel);
+  __attribute__((noinline)) Sight add_transparent(const Ray& ray, int lane, double max_t, std::size_t pixel);
   void add_face(const Ray& ray, const MetFace& face, std::size_t pixel, Sight& sight);
   // Processes a ray's entry into a body from air (null) or from a touching body. `normal`: of that surface, in its
   // grid.
@@ -112,6 +119,7 @@ class Tile {
   BlockVector<SurfacePoint> points_;
   BlockVector<Target> targets_;
   BlockVector<Vec3> lit_;
+  ThroughHits through_;                  // of the current block
   SeenThrough seen_;                     // of the current ray
   std::unique_ptr<raster::Canvas> far_;  // of the current sample; null if there are none
   FarFaces far_faces_;                   // of the current block
@@ -163,7 +171,7 @@ void Tile::take_block(int x, int y, const RayPacket& rays, int sample) {
   context_->view->first_hits(rays, hits);
   rays_ += std::popcount(rays.active);
   if (far_ != nullptr) context_->impostors->find(column_ + x, row_ + y, rays, *far_, hits, far_faces_);
-  const std::uint32_t through_glass = lanes_through_glass(rays, hits);
+  const std::uint32_t through_glass = find_through(rays, hits);
   for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
     const int lane = std::countr_zero(left);
     const auto i = static_cast<std::size_t>(lane);
@@ -173,7 +181,7 @@ void Tile::take_block(int x, int y, const RayPacket& rays, int sample) {
     double begin = t;
     Sight sight;
     if ((through_glass >> lane & 1U) != 0) {
-      sight = add_transparent(rays.ray(lane), t, pixel);
+      sight = add_transparent(rays.ray(lane), lane, t, pixel);
       begin = std::min(t, seen_.begin());
     }
     if (sample == 0) {
@@ -190,13 +198,14 @@ void Tile::take_block(int x, int y, const RayPacket& rays, int sample) {
   }
 }
 
-std::uint32_t Tile::lanes_through_glass(const RayPacket& rays, const SceneHits& hits) const {
+std::uint32_t Tile::find_through(const RayPacket& rays, const SceneHits& hits) {
   if (!context_->view->tracer().has_transparent()) return 0;
   RayPacket visible = rays;
   for (std::size_t i = 0; i < RayPacket::kSize; ++i) {
     if ((hits.grids.hit >> i & 1U) != 0) visible.max_t[i] = hits.grids.t[i];
   }
-  return context_->view->any_transparent(visible);
+  context_->view->find_through(visible, through_);
+  return through_.glass | through_.faces;
 }
 
 void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight) {
@@ -234,9 +243,9 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
   point.openness = openness_of(*far_faces_.face[i], context_->options->light.occlusion_mode, point.position);
 }
 
-Tile::Sight Tile::add_transparent(const Ray& ray, double max_t, std::size_t pixel) {
+Tile::Sight Tile::add_transparent(const Ray& ray, int lane, double max_t, std::size_t pixel) {
   const Surfaces& surfaces = context_->lighting->surfaces();
-  find_transparent(*context_->view, surfaces, ray, max_t, seen_);
+  find_transparent(*context_->view, surfaces, through_, lane, max_t, seen_);
   Sight sight;
   const LightOptions& light = context_->options->light;
   const bool as_solid = shows_values(light.shading);
@@ -260,6 +269,7 @@ Tile::Sight Tile::add_transparent(const Ray& ray, double max_t, std::size_t pixe
     }
     last = &body;
     if (as_solid && body.starts_inside) continue;
+    if (is_unseen(sight.passed)) break;
     std::optional<Surface> textured;
     const GlassLook look = as_solid ? GlassLook{Vec3(0.0F), 1.0F} : look_of(surface_of(surfaces, body, textured), body);
     fill_in(ray, body, normal, add_point(pixel, sight.passed * look.own));
@@ -270,6 +280,7 @@ Tile::Sight Tile::add_transparent(const Ray& ray, double max_t, std::size_t pixe
     if (!lies_on_opaque(*context_->view, ray, *last, seen_.end)) leave_body(ray, *last, sight);
   }
   add_faces(std::numeric_limits<double>::infinity());
+  sight.is_closed |= is_unseen(sight.passed);
   return sight;
 }
 

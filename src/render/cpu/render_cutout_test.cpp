@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -15,6 +16,7 @@
 #include "core/work/nightly_for_tests.h"
 #include "render/cpu/environment_for_tests.h"
 #include "render/cpu/render_test_support.h"
+#include "render/light/glass_bodies.h"
 #include "scene/surfaces.h"
 
 namespace quoin {
@@ -298,6 +300,50 @@ TEST(RenderCutout, ShowsTwoGridsAsOne) {
       EXPECT_LE(count_different(a, b, 1), 20) << seed;
     }
   }
+}
+
+// In one grid and in two.
+TEST(RenderCutout, PacketsEndAtTheSameTexelsAsSingleRays) {
+  int ended_count = 0;
+  int passed_count = 0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    Scene scene = random_scene(seed);
+    if (seed % 2 == 0) {
+      Grid other;
+      other.fill_box({{-3, -3, 3}, {3, 3, 5}}, 4);  // cutout
+      place(scene, std::move(other));
+    }
+    const SceneTracer tracer(scene);
+    const Surfaces surfaces(scene.types);
+    const SceneView view(tracer, DVec3(0.0));
+    std::mt19937 random(seed);
+    const auto between = [&](double low, double high) {
+      return std::uniform_real_distribution<double>(low, high)(random);
+    };
+    for (int round = 0; round < cases(60, 2000); ++round) {
+      RayPacket rays;
+      const DVec3 near{between(-6.0, 8.0), between(-4.0, 5.0), between(-6.0, 6.0)};
+      for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+        const DVec3 off{between(-1.0, 1.0), between(-1.0, 1.0), between(-1.0, 1.0)};
+        const DVec3 direction{between(-1.0, 1.0), between(-1.0, 1.0), between(-1.0, 1.0)};
+        rays.set(lane, {near + off, glm::normalize(direction)}, 6.0);
+      }
+      rays.active &= ~view.any_hits(0, rays);
+      std::uint32_t met = 0;
+      const std::uint32_t ended = ends_at_faces(view, surfaces, 0, rays, met);
+      EXPECT_EQ(ended & ~met, 0U);
+      for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
+        const int lane = std::countr_zero(left);
+        SeenThrough seen;
+        find_transparent(view, surfaces, rays.ray(lane), 6.0, seen);
+        ASSERT_EQ(seen.is_closed(), (ended >> lane & 1U) != 0) << seed;
+        ASSERT_TRUE(seen.faces.empty() || (met >> lane & 1U) != 0);
+        (seen.is_closed() ? ended_count : passed_count) += 1;
+      }
+    }
+  }
+  EXPECT_GT(ended_count, 100);
+  EXPECT_GT(passed_count, 100);
 }
 
 // The sun shines straight down on a plate below one of cutout or translucent texels.

@@ -14,9 +14,11 @@
 #include <quoin/mesh/blocky.h>
 #include <quoin/scene/scene_query.h>
 
+#include "core/work/nightly_for_tests.h"
 #include "grid/shapes/shape_types_for_tests.h"
 #include "render/cpu/render_test_support.h"
 #include "render/light/glass_bodies.h"
+#include "scene/tracer/placed_grid.h"
 
 namespace quoin {
 namespace {
@@ -348,6 +350,56 @@ TEST(RenderShapes, FluidsOfOneKindAreOneBody) {
     EXPECT_EQ(joined[0].type, 1) << "the one that the ray enters";
     EXPECT_EQ(Pool(4, 1).bodies_along(ray).size(), 2U) << "of other kinds";
   }
+}
+
+// Every other ray starts above the surface of the water, within its voxel.
+TEST(RenderShapes, PacketsFindTheSameWaterAsSingleRays) {
+  const Pool pool(2, 1);
+  const SceneTracer tracer(pool.scene);
+  const Surfaces surfaces(pool.scene.types);
+  const SceneView view(tracer, DVec3(0.0));
+  std::mt19937 random(5);
+  const auto between = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  int met = 0;
+  int skipped = 0;
+  for (int round = 0; round < cases(200, 5000); ++round) {
+    RayPacket rays;
+    for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+      const double y = lane % 2 == 0 ? between(2.9, 3.0) : between(-1.0, 5.0);
+      const DVec3 direction{between(-1.0, 1.0), between(-1.0, 1.0), between(-1.0, 1.0)};
+      rays.set(lane, {{between(-3.0, 15.0), y, between(-3.0, 11.0)}, direction}, lane == 3 ? 2.0 : 100.0);
+    }
+    ThroughHits hits;
+    view.find_through(rays, hits);
+    ASSERT_TRUE(hits.has_first);
+    EXPECT_EQ(hits.glass & ~view.any_transparent(rays), 0U);
+    for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+      const double max_t = rays.max_t[static_cast<std::size_t>(lane)];
+      SeenThrough expected;
+      find_transparent(view, surfaces, rays.ray(lane), max_t, expected);
+      if ((hits.glass >> lane & 1U) == 0) {
+        ASSERT_TRUE(expected.bodies.empty());
+        skipped += placed_in(tracer)[0].glass_voxels->is_occupied(voxel_of(rays.ray(lane).origin)) ? 1 : 0;
+        continue;
+      }
+      SeenThrough found;
+      find_transparent(view, surfaces, hits, lane, max_t, found);
+      ASSERT_EQ(found.bodies.size(), expected.bodies.size());
+      for (std::size_t i = 0; i < found.bodies.size(); ++i) {
+        EXPECT_EQ(found.bodies[i].type, expected.bodies[i].type);
+        EXPECT_EQ(found.bodies[i].voxel, expected.bodies[i].voxel);
+        EXPECT_EQ(found.bodies[i].starts_inside, expected.bodies[i].starts_inside);
+        EXPECT_EQ(found.bodies[i].exit_in_shape, expected.bodies[i].exit_in_shape);
+        EXPECT_NEAR(found.bodies[i].t_enter, expected.bodies[i].t_enter, 1e-9);
+        EXPECT_NEAR(found.bodies[i].voxels, expected.bodies[i].voxels, 1e-6);
+        ++met;
+      }
+    }
+  }
+  EXPECT_GT(met, 500);
+  EXPECT_GT(skipped, 50);
 }
 
 TEST(RenderShapes, WaterSurroundsShapesThatContainIt) {

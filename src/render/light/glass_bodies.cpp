@@ -2,6 +2,7 @@
 #include "scene/tracer/placed_grid.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include <glm/geometric.hpp>
@@ -33,6 +34,15 @@ float alpha_of(Rgba8 texel) {
   return static_cast<float>(texel.a) / 255.0F;
 }
 
+// The part of a shape's glass within a cell. `look`: of the side where the ray enters; null if it has no texture.
+struct ShapePart {
+  double t_enter;
+  double t_exit;
+  double voxels;
+  ShapeSpan span;
+  const VoxelFace* look;
+};
+
 // The bodies of one placed grid along a ray, in order.
 class BodiesOfGrid {
  public:
@@ -51,31 +61,28 @@ class BodiesOfGrid {
     QUOIN_ASSERT(placed_.voxel_size > 0.0, "a positive voxel size");
   }
 
-  // Returns false if a face ends the ray.
-  bool add_voxels() {
-    // Two loops, so that worlds without textures pay nothing.
-    if (placed_.level == 0 && surfaces_.has_textured_cells()) return add_textured_voxels();
-    add_plain_voxels();
-    return true;
+  // Finds the faces of cells. If one ends the ray, whatever is added later ends there. `first`: the first cell, if it
+  // is known, as for `add_glass`.
+  void add_faces(const RayHit* first) {
+    GridReader voxels_of(*placed_.voxels);
+    const ShapeIndex* const shapes = placed_.shapes == nullptr ? nullptr : &placed_.shapes->index;
+    visit_spans(
+        *placed_.face_cells, first, [](trace::Walk& walk, const trace::WalkSpan&) { walk.leave_voxel(); },
+        [&](const trace::WalkSpan& span) {
+          const VoxelType type = voxels_of.get(span.voxel);
+          if (meet_cell(surfaces_, voxels_of, shapes, index_, type, ray_, cell_span(span), max_t_, faces_)) return true;
+          max_t_ = faces_.back().t;
+          return false;
+        });
   }
+  [[nodiscard]] double end() const { return max_t_; }
 
-  void add_shapes() {
-    begin();
-    const TracedShapes& shapes = *placed_.shapes;
-    visit_hits(shapes.glass, ray_, max_t_, [&](const VoxelSpan& cell) {
-      const std::size_t old_size = parts_.size();
-      const ShapesAtVoxel here = shapes.index.at(cell.voxel);
-      for (const ListedShape& shape : here.listed()) {
-        if (shape.type >= shapes.is_glass.size() || shapes.is_glass[shape.type] == 0) continue;
-        visit_shape(here, shape, ray_, [&](const ShapeSpan& span) { note_part(span, cell); });
-      }
-      std::sort(parts_.begin() + static_cast<std::ptrdiff_t>(old_size), parts_.end(),
-                [](const GlassBody& a, const GlassBody& b) { return a.t_enter < b.t_enter; });
-      bool is_open = true;
-      for (std::size_t i = old_size; i < parts_.size() && is_open; ++i) is_open = add(parts_[i]);
-      parts_.resize(old_size);
-      return is_open;
-    });
+  // Two loops, so that worlds without textures and shapes pay nothing.
+  void add_glass(const RayHit* first) {
+    if (placed_.shapes != nullptr || (placed_.level == 0 && surfaces_.has_textured_glass())) {
+      return add_other_glass(first);
+    }
+    add_plain_glass();
   }
 
   void add_field() {
@@ -94,63 +101,102 @@ class BodiesOfGrid {
 
  private:
   // Flat, as the only loop of its kind would be: with two loops GCC no longer inlines the walk (3 % of an image).
-  __attribute__((flatten)) void add_plain_voxels() {
+  __attribute__((flatten)) void add_plain_glass() {
     begin();
     GridReader voxels_of(*placed_.voxels);
     VoxelType type = kAir;
     const auto largest = [&] { return largest_block(surfaces_[type].log_clarity); };
     const auto enter = [&](const trace::WalkSpan& begun) { type = voxels_of.get(begun.voxel); };
-    trace::visit_blocks(*placed_.transparent, ray_, max_t_, enter, largest, [&](const trace::WalkSpan& span) {
+    trace::visit_blocks(*placed_.glass_voxels, ray_, max_t_, enter, largest, [&](const trace::WalkSpan& span) {
       return add_span(span, type, surfaces_[type].log_clarity, nullptr);
     });
   }
 
-  __attribute__((noinline)) bool add_textured_voxels() {
+  // With textured glass and shapes.
+  __attribute__((noinline)) void add_other_glass(const RayHit* first) {
     begin();
     GridReader voxels_of(*placed_.voxels);
-    const ShapeIndex* const shapes = placed_.shapes == nullptr ? nullptr : &placed_.shapes->index;
+    const bool has_textures = placed_.level == 0 && surfaces_.has_textured_glass();
+    std::optional<ShapeIndex::Reader> shapes;
+    if (placed_.shapes != nullptr) shapes.emplace(placed_.shapes->index);
+    std::optional<BoxRay> straight;
     VoxelType type = kAir;
-    CellContent content = CellContent::Glass;
     float log_clarity = 0.0F;
+    bool is_textured = false;
     Rgba8 texel;
-    bool is_open = true;
-    const auto largest = [&] { return content == CellContent::Faces ? kLargestBlock : largest_block(log_clarity); };
+    ShapesAtVoxel here;
+    const auto largest = [&] { return largest_block(log_clarity); };
     const auto enter = [&](const trace::WalkSpan& begun) {
       type = voxels_of.get(begun.voxel);
-      const TypeFaces* const faces = surfaces_.faces(type);
-      content = faces == nullptr ? CellContent::Glass : faces->content;
       log_clarity = surfaces_[type].log_clarity;
-      if (content != CellContent::TexturedGlass) return;
-      const FaceTexels* const side = side_entered(*faces, type, begun, texel);
-      if (side != nullptr) {
-        log_clarity = std::log(1.0F - side->cover(texel));
-      } else {
-        content = CellContent::Glass;  // its mean colour
-      }
+      is_textured = false;
+      const TypeFaces* const faces = has_textures ? surfaces_.faces(type) : nullptr;
+      if (faces == nullptr || faces->content != CellContent::TexturedGlass) return;
+      is_textured = enter_textured(*faces, type, begun, texel, log_clarity);
     };
-    trace::visit_blocks(*placed_.transparent, ray_, max_t_, enter, largest, [&](const trace::WalkSpan& span) {
-      if (content == CellContent::Faces) {
-        is_open = meet_cell(surfaces_, voxels_of, shapes, index_, type, ray_, cell_span(span), max_t_, faces_);
-        return is_open;
+    const auto leave = [&](trace::Walk& walk, const trace::WalkSpan& begun) {
+      const int size = walk.block_size();
+      // Shapes touch no voxel of a larger block.
+      here = size > 1 || !shapes ? ShapesAtVoxel() : shapes->at(begun.voxel);
+      if (!here.empty()) return walk.leave_voxel();
+      enter(begun);
+      walk.leave_block(size, largest);
+    };
+    visit_spans(*placed_.glass_voxels, first, leave, [&](const trace::WalkSpan& span) {
+      if (here.empty()) return add_span(span, type, log_clarity, is_textured ? &texel : nullptr);
+      if (!straight) straight.emplace(ray_.origin, ray_.direction);
+      if (!here.has_own() && is_glass_cube(voxels_of.get(span.voxel), span.voxel)) {
+        enter(span);
+        if (!add_span(span, type, log_clarity, is_textured ? &texel : nullptr)) return false;
       }
-      return add_span(span, type, log_clarity, content == CellContent::TexturedGlass ? &texel : nullptr);
+      return add_shapes(here, span, *straight);
     });
-    return is_open;
   }
 
-  // Finds the texel of textured glass that continues or begins with a span. Returns its side; null if the ray began
-  // inside.
-  [[nodiscard]] const FaceTexels* side_entered(const TypeFaces& faces, VoxelType type, const trace::WalkSpan& begun,
-                                               Rgba8& texel) const {
-    if (out_.size() > first_ && continues(surfaces_, out_.back(), type, begun.t_enter)) {
-      const GlassBody& body = out_.back();
-      texel = body.texel;
-      return body.is_textured ? &faces.sides[static_cast<std::size_t>(body.face)] : nullptr;
+  template <class Leave, class Visit>
+  void visit_spans(const OccupancyTree& tree, const RayHit* first, const Leave& leave, const Visit& visit) {
+    if (first == nullptr) return trace::visit_spans(tree, ray_, max_t_, leave, visit);
+    trace::Walk walk(tree, ray_);
+    walk.begin(tree.bounds(), first->voxel, first->t, first->starts_inside ? -1 : frame_of(first->face).axis);
+    trace::visit_spans(walk, ray_, max_t_, leave, visit);
+  }
+
+  // Returns true if a voxel that shapes of others touch is itself a cube of glass.
+  [[nodiscard]] bool is_glass_cube(VoxelType type, IVec3 voxel) const {
+    if (!types_->is_transparent(type)) return false;
+    if (types_->is_shaped(type)) return placed_.shapes->index.is_cube(voxel);
+    const TypeFaces* const faces = surfaces_.faces(type);
+    return faces == nullptr || faces->content != CellContent::Faces;
+  }
+
+  // Adds the glass of the shapes that touch a cell. Returns false if nothing behind it is visible.
+  bool add_shapes(const ShapesAtVoxel& here, const trace::WalkSpan& cell, BoxRay& straight) {
+    const std::vector<std::uint8_t>& is_glass = placed_.shapes->is_glass;
+    parts_.clear();
+    for (const ListedShape& shape : here.listed()) {
+      if (shape.type >= is_glass.size() || is_glass[shape.type] == 0) continue;
+      visit_shape(here, shape, ray_, straight, [&](const ShapeSpan& span) { note_part(span, cell); });
     }
-    if (begun.starts_inside) return nullptr;
+    if (parts_.size() > 1) {
+      std::sort(parts_.begin(), parts_.end(),
+                [](const ShapePart& a, const ShapePart& b) { return a.t_enter < b.t_enter; });
+    }
+    return std::ranges::all_of(parts_, [this](const ShapePart& part) { return add(part); });
+  }
+
+  // Finds the texel of textured glass that continues or begins with a span, and its absorption. Returns false if the
+  // ray began inside.
+  [[nodiscard]] bool enter_textured(const TypeFaces& faces, VoxelType type, const trace::WalkSpan& begun, Rgba8& texel,
+                                    float& log_clarity) {
+    if (out_.size() > first_ && continues(surfaces_, out_.back(), type, begun.t_enter)) {
+      log_clarity = log_clarity_;
+      return out_.back().is_textured;
+    }
+    if (begun.starts_inside) return false;
     const FaceTexels& side = faces.sides[static_cast<std::size_t>(begun.face)];
     texel = side.texel(ray_.origin + ray_.direction * begun.t_enter, begun.voxel, 0);
-    return &side;
+    log_clarity = std::log(1.0F - side.cover(texel));
+    return true;
   }
   static CellSpan cell_span(const trace::WalkSpan& span) {
     return {span.voxel, span.behind, span.face, span.exit_face, span.starts_inside, span.t_enter, span.t_exit};
@@ -172,6 +218,7 @@ class BodiesOfGrid {
       next.voxels = voxels;
       next.face = span.face;
       next.exit_face = span.exit_face;
+      log_clarity_ = log_clarity;
       if (texel != nullptr) {
         next.is_textured = true;
         next.texel = *texel;
@@ -205,6 +252,7 @@ class BodiesOfGrid {
 
   void lengthen(double t_exit, Direction exit_face, double voxels) {
     GlassBody& body = out_.back();
+    body.exit_in_shape = false;
     body.t_exit = t_exit;
     body.exit_face = exit_face;
     body.voxels += voxels;
@@ -227,40 +275,60 @@ class BodiesOfGrid {
     const VoxelFace* const look = face == nullptr ? nullptr : look_of(model, *face, (*types_)[span.shape.type].faces);
     const bool has_texture = look != nullptr && !look->texture.is_null();
     if (has_texture && look->alpha != FaceAlpha::Translucent) return;  // no glass
-    GlassBody& part = parts_.emplace_back();
-    fill_in(part, span.shape.voxel, span.shape.type, t_enter, t_exit);
-    part.starts_inside = starts_inside;
-    part.voxels = is_plate ? kThinnest : voxels_between(t_enter, t_exit);
-    part.model = &model;
-    part.shape_face = starts_inside ? std::int16_t{-1} : span.enter.face;
-    part.exit_in_shape = true;
-    part.normal = span.normal(span.enter);
-    part.exit_normal = span.normal(span.exit);
-    part.face = nearest_direction(DVec3(part.normal));
-    part.exit_face = nearest_direction(DVec3(part.exit_normal));
-    if (!has_texture) return;
-    const DVec3 point = ray_.origin + ray_.direction * span.enter.t - DVec3(span.shape.voxel);
-    part.is_textured = true;
-    part.texel = shape_texel(*face, *look, point);
-    part.look = look;
+    const double voxels = is_plate ? kThinnest : voxels_between(t_enter, t_exit);
+    parts_.push_back({t_enter, t_exit, voxels, span, has_texture ? look : nullptr});
   }
 
-  // Returns false if nothing behind the body is visible.
+  // Return false if nothing behind the body, or part, is visible.
   bool add(const GlassBody& next) {
     if (!(next.voxels > 0.0)) return true;  // an edge that it only touches
     if (out_.size() > first_ && continues(surfaces_, out_.back(), next.type, next.t_enter)) {
-      GlassBody& body = out_.back();
-      if (next.t_exit <= body.t_exit) return true;  // within it: the same box in another cell, or crossing plates
-      body.exit_in_shape = next.exit_in_shape;
-      body.exit_normal = next.exit_normal;
+      if (next.t_exit <= out_.back().t_exit) return true;
       lengthen(next.t_exit, next.exit_face, next.voxels);
     } else {
       out_.push_back(next);
     }
-    // Only shapes are textured here.
-    const float log_clarity =
-        next.is_textured ? std::log(1.0F - alpha_of(next.texel)) : surfaces_[next.type].log_clarity;
-    return is_seen_beyond(log_clarity, next.voxels);
+    return is_seen_beyond(surfaces_[next.type].log_clarity, next.voxels);
+  }
+  bool add(const ShapePart& part) {
+    if (!(part.voxels > 0.0)) return true;  // an edge that it only touches
+    const ShapeSpan& span = part.span;
+    if (out_.size() > first_ && continues(surfaces_, out_.back(), span.shape.type, part.t_enter)) {
+      GlassBody& body = out_.back();
+      if (part.t_exit <= body.t_exit) return true;  // within it: the same box in another cell, or crossing plates
+      lengthen(part.t_exit, direction_of(span, span.exit), part.voxels);
+    } else {
+      begin_body(part);
+    }
+    out_.back().exit_in_shape = true;
+    out_.back().exit_normal = span.normal(span.exit);
+    return is_seen_beyond(log_clarity_, part.voxels);
+  }
+
+  void begin_body(const ShapePart& part) {
+    const ShapeSpan& span = part.span;
+    GlassBody& body = out_.emplace_back();
+    fill_in(body, span.shape.voxel, span.shape.type, part.t_enter, part.t_exit);
+    body.starts_inside = span.starts_inside();
+    body.voxels = part.voxels;
+    body.model = span.shape.model;
+    body.shape_face = body.starts_inside ? std::int16_t{-1} : span.enter.face;
+    body.normal = span.normal(span.enter);
+    body.face = direction_of(span, span.enter);
+    body.exit_face = direction_of(span, span.exit);
+    log_clarity_ = surfaces_[body.type].log_clarity;
+    if (part.look == nullptr) return;
+    const DVec3 point = ray_.origin + ray_.direction * span.enter.t - DVec3(body.voxel);
+    body.is_textured = true;
+    body.texel = shape_texel(body.model->faces[static_cast<std::size_t>(span.enter.face)], *part.look, point);
+    body.look = part.look;
+    log_clarity_ = std::log(1.0F - alpha_of(body.texel));
+  }
+
+  // Returns the direction nearest to the normal at an end.
+  static Direction direction_of(const ShapeSpan& span, const ShapeSpan::End& end) {
+    if (span.box != nullptr && !span.box->is_turned) return end.side;
+    return nearest_direction(DVec3(span.normal(end)));
   }
 
   const PlacedGrid& placed_;
@@ -273,9 +341,10 @@ class BodiesOfGrid {
   double voxels_per_cell_;
   std::vector<GlassBody>& out_;
   std::vector<MetFace>& faces_;
-  std::vector<GlassBody> parts_;  // of shapes, in the cell that the ray is in
+  std::vector<ShapePart> parts_;  // in the cell that the ray is in
   std::size_t first_ = 0;
   double clarity_ = 0.0;
+  float log_clarity_ = 0.0F;  // of the last body, per voxel
 };
 
 // Sorts bodies along the ray and joins those of neighbouring grids that touch.
@@ -330,14 +399,81 @@ void find_transparent(const SceneView& view, const Surfaces& surfaces, const Ray
     QUOIN_ASSERT(static_cast<std::size_t>(index) < placed_in(view.tracer()).size(), "one of the placed grids");
     const PlacedGrid& placed = placed_in(view.tracer())[static_cast<std::size_t>(index)];
     BodiesOfGrid bodies(view, surfaces, index, ray, out.end, length, out);
-    const bool has_shapes = placed.shapes != nullptr && placed.shapes->has_glass();
-    lists += (placed.transparent != nullptr ? 1 : 0) + (has_shapes ? 1 : 0) + (placed.glass != nullptr ? 1 : 0);
-    if (placed.transparent != nullptr && !bodies.add_voxels()) out.end = out.faces.back().t;
-    if (has_shapes) bodies.add_shapes();
+    lists += (placed.glass_voxels != nullptr ? 1 : 0) + (placed.glass != nullptr ? 1 : 0);
+    if (placed.face_cells != nullptr) bodies.add_faces(nullptr);
+    out.end = bodies.end();
+    if (placed.glass_voxels != nullptr) bodies.add_glass(nullptr);
     if (placed.glass != nullptr) bodies.add_field();
   });
   if (lists > 1) join_touching(surfaces, out.bodies);
   if (!out.faces.empty()) end_at_first_closed(out);
+}
+
+void find_transparent(const SceneView& view, const Surfaces& surfaces, const ThroughHits& hits, int lane, double max_t,
+                      SeenThrough& out) {
+  const Ray ray = hits.rays.ray(lane);
+  if (!hits.has_first) return find_transparent(view, surfaces, ray, max_t, out);
+  out.clear();
+  out.end = max_t;
+  const PlacedGrid& placed = placed_in(view.tracer()).front();
+  BodiesOfGrid bodies(view, surfaces, 0, ray, max_t, glm::length(ray.direction) * placed.voxel_size, out);
+  const auto first = [&](const PacketHits& of, const auto& add) {
+    if ((of.hit >> lane & 1U) == 0) return;
+    const RayHit hit = of[lane];
+    if (hit.t <= bodies.end()) add(&hit);
+  };
+  first(hits.first_faces, [&](const RayHit* hit) { bodies.add_faces(hit); });
+  out.end = bodies.end();
+  first(hits.first_glass, [&](const RayHit* hit) { bodies.add_glass(hit); });
+  if (placed.glass != nullptr) bodies.add_field();
+  if (placed.glass_voxels != nullptr && placed.glass != nullptr) join_touching(surfaces, out.bodies);
+  if (!out.faces.empty()) end_at_first_closed(out);
+}
+
+namespace {
+
+// Returns true if a cell of faces ends a ray, beginning with the first one that it hits, of a packet's `hits`.
+bool ends_at_face(const PlacedGrid& placed, const Surfaces& surfaces, std::int32_t index, const RayPacket& rays,
+                  const PacketHits& hits, int lane, GridReader& voxels, std::vector<MetFace>& room) {
+  const auto i = static_cast<std::size_t>(lane);
+  const Ray ray = rays.ray(lane);
+  const double max_t = rays.max_t[i];
+  const ShapeIndex* const shapes = placed.shapes == nullptr ? nullptr : &placed.shapes->index;
+  const bool starts_inside = (hits.starts_inside >> lane & 1U) != 0;
+  trace::Walk walk(*placed.face_cells, ray);
+  walk.begin(placed.face_cells->bounds(), {hits.x[i], hits.y[i], hits.z[i]}, hits.t[i],
+             starts_inside ? -1 : frame_of(hits.face[i]).axis);
+  do {
+    CellSpan cell{walk.voxel(), {}, trace::face_of(walk, ray), Direction::PosX, walk.axis() < 0, walk.t(), 0.0};
+    walk.leave_voxel();
+    cell.behind = walk.voxel();
+    cell.exit_face = opposite(trace::face_of(walk, ray));
+    cell.t_exit = walk.t();
+    room.clear();
+    if (!meet_cell(surfaces, voxels, shapes, index, voxels.get(cell.first), ray, cell, max_t, room)) return true;
+  } while (walk.is_within(max_t) && walk.find(max_t));
+  return false;
+}
+
+}  // namespace
+
+std::uint32_t ends_at_faces(const SceneView& view, const Surfaces& surfaces, std::int32_t home,
+                            const RayPacket& rays_in_grid, std::uint32_t& met) {
+  met = 0;
+  std::vector<MetFace> room;
+  return view.visit_face_cells(home, rays_in_grid,
+                               [&](std::int32_t index, const RayPacket& rays, const PacketHits& hits) {
+                                 const PlacedGrid& placed = placed_in(view.tracer())[static_cast<std::size_t>(index)];
+                                 GridReader voxels(*placed.voxels);
+                                 std::uint32_t ended = 0;
+                                 for (std::uint32_t left = hits.hit; left != 0; left &= left - 1) {
+                                   const int lane = std::countr_zero(left);
+                                   if (ends_at_face(placed, surfaces, index, rays, hits, lane, voxels, room))
+                                     ended |= 1U << lane;
+                                 }
+                                 met |= hits.hit;
+                                 return ended;
+                               });
 }
 
 Surface textured_surface(const Surfaces& surfaces, const GlassBody& body) {
@@ -411,10 +547,10 @@ Mirror mirror_at(const SceneView& view, const Ray& ray_in_view, std::int32_t pla
   return {share, direction.y - 2.0F * along * normal.y};
 }
 
-Vec3 transmittance_along(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view, double max_t,
-                         SeenThrough& room) {
+Vec3 transmittance_along(const SceneView& view, const Surfaces& surfaces, const ThroughHits& hits, int lane,
+                         double max_t, SeenThrough& room) {
   Vec3 passed(1.0F);
-  find_transparent(view, surfaces, ray_in_view, max_t, room);
+  find_transparent(view, surfaces, hits, lane, max_t, room);
   if (room.is_closed()) return Vec3(0.0F);
   std::optional<Surface> textured;
   for (const GlassBody& body : room.bodies) passed *= look_of(surface_of(surfaces, body, textured), body).passed;

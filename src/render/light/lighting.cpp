@@ -329,7 +329,7 @@ std::int64_t Lighting::find_sunlight(std::span<const Group> groups, std::span<Ve
 
 std::int64_t Lighting::shadow(const Group& group, RayPacket& rays, std::span<Vec3> light) const {
   const std::int64_t count = std::popcount(rays.active);
-  darken(group, rays, view_->any_hits(group.placed, rays), light);
+  darken(group, rays, view_->any_hits(group.placed, rays, MostRays::Hit), light);
   return count;
 }
 
@@ -342,25 +342,28 @@ void Lighting::darken(const Group& group, RayPacket& rays, std::uint32_t blocked
 }
 
 void Lighting::tint(const Group& group, const RayPacket& rays, std::span<Vec3> light) const {
-  const RayPacket in_view = view_->view_from_grid(group.placed, rays);
+  std::uint32_t met = 0;
+  const std::uint32_t ended =
+      surfaces_->has_cells_of_faces() ? ends_at_faces(*view_, *surfaces_, group.placed, rays, met) : 0;
+  for (std::uint32_t left = ended; left != 0; left &= left - 1) {
+    light[static_cast<std::size_t>(std::countr_zero(left))] = Vec3(0.0F);
+  }
+  RayPacket rest = rays;
+  rest.active &= ~ended;
+  if (rest.active == 0) return;
+  ThroughHits hits;
+  view_->find_glass(group.placed, rest, hits);
+  std::uint32_t tinted = hits.glass;
+  if (surfaces_->has_tinted_cells() && (met & ~ended) != 0) {
+    view_->find_through(view_->view_from_grid(group.placed, rest), hits);
+    tinted = hits.glass | hits.faces;
+  }
   SeenThrough room;
-  for (std::uint32_t left = view_->any_transparent(in_view); left != 0; left &= left - 1) {
-    const int lane = std::countr_zero(left);
+  for (; tinted != 0; tinted &= tinted - 1) {
+    const int lane = std::countr_zero(tinted);
     const auto i = static_cast<std::size_t>(lane);
-    light[i] *= transmittance_along(*view_, *surfaces_, in_view.ray(lane), in_view.max_t[i], room);
+    light[i] *= transmittance_along(*view_, *surfaces_, hits, lane, rest.max_t[i], room);
   }
-}
-
-std::uint32_t Lighting::blocked_by_faces(const Group& group, const RayPacket& rays) const {
-  const RayPacket in_view = view_->view_from_grid(group.placed, rays);
-  SeenThrough room;
-  std::uint32_t blocked = 0;
-  for (std::uint32_t left = view_->any_transparent(in_view); left != 0; left &= left - 1) {
-    const int lane = std::countr_zero(left);
-    find_transparent(*view_, *surfaces_, in_view.ray(lane), in_view.max_t[static_cast<std::size_t>(lane)], room);
-    if (room.is_closed()) blocked |= 1U << lane;
-  }
-  return blocked;
 }
 
 // A group's points, from their grid's pivot, and their normals, along the world's axes: lamps light them.
@@ -535,7 +538,8 @@ std::int64_t Lighting::trace_openness(const Group& group, std::uint32_t lanes, s
     std::uint32_t blocked = view_->any_hits(group.placed, rays);
     if (has_faces) {
       rays.active = lanes & ~blocked;
-      blocked |= blocked_by_faces(group, rays);
+      std::uint32_t met = 0;
+      blocked |= ends_at_faces(*view_, *surfaces_, group.placed, rays, met);
       rays.active = lanes;
     }
     for (std::size_t i = 0; i < group.size; ++i) open[i] += static_cast<int>((blocked >> i & 1U) == 0);

@@ -130,8 +130,6 @@ class Lighting {
   std::int64_t find_openness(const Group& group, std::span<float> openness) const;
   [[nodiscard]] float smooth_openness(const SurfacePoint& point) const;
   std::int64_t trace_openness(const Group& group, std::uint32_t lanes, std::span<float> openness) const;
-  // Returns the rays that meet a visible texel of a cell of faces that hides everything behind it.
-  [[nodiscard]] std::uint32_t blocked_by_faces(const Group& group, const RayPacket& rays) const;
   void set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const;
   /// The colours that a point shows.
   struct Colours {

@@ -267,6 +267,12 @@ inline void expect_same_placed(const SceneTracer& updated, const SceneTracer& fr
     if (a.transparent != nullptr) {
       EXPECT_EQ(a.transparent->bounds(), b.transparent->bounds());
     }
+    for (const auto tree : {&PlacedGrid::glass_voxels, &PlacedGrid::face_cells}) {
+      ASSERT_EQ(a.*tree == nullptr, b.*tree == nullptr);
+      if (b.*tree != nullptr) {
+        EXPECT_EQ((a.*tree)->bounds(), (b.*tree)->bounds());
+      }
+    }
     counts.halved += b.level > 0;
     EXPECT_TRUE(b.level == 0 || b.shapes == nullptr);
     // Instances share them.

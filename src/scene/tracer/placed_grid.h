@@ -28,10 +28,13 @@ struct PlacedGrid {
   DVec3 pivot{0.0};                 ///< in the coordinates of `voxels`
   const OccupancyTree* opaque = nullptr;
   const OccupancyTree* transparent = nullptr;  ///< null if the grid has no transparent voxel; without shaped voxels
-  const TracedShapes* shapes = nullptr;        ///< null if no voxel has a shape; halved grids have cubes instead
-  const DensityTree* field = nullptr;          ///< in the space of `voxels`; null if the field has no solid
-  const DensityTree* opaque_field = nullptr;   ///< the opaque part of the field: `field` if all is opaque; may be null
-  const DensityGlass* glass = nullptr;         ///< the transparent part of the field, or null
+  /// The voxels in which rays meet glass, and the visible cells of faces (SightTrees); null if there are none.
+  const OccupancyTree* glass_voxels = nullptr;
+  const OccupancyTree* face_cells = nullptr;
+  const TracedShapes* shapes = nullptr;       ///< null if no voxel has a shape; halved grids have cubes instead
+  const DensityTree* field = nullptr;         ///< in the space of `voxels`; null if the field has no solid
+  const DensityTree* opaque_field = nullptr;  ///< the opaque part of the field: `field` if all is opaque; may be null
+  const DensityGlass* glass = nullptr;        ///< the transparent part of the field, or null
   glm::dmat3 world_axes{1.0};  ///< columns: the grid's axes in the world, unit; a mirrored instance's x is negated
   DVec3 position{0.0};         ///< of the grid's pivot, in the world
   double voxel_size = 1.0;     ///< world units per voxel of `voxels`

@@ -84,7 +84,7 @@ std::size_t SceneTracer::bytes() const {
     if (field != nullptr) trees.insert(&field->cells());
   };
   for (const PlacedGrid& placed : impl_of(impl_).placed) {
-    trees.insert({placed.opaque, placed.transparent});
+    trees.insert({placed.opaque, placed.transparent, placed.glass_voxels, placed.face_cells});
     if (placed.shapes != nullptr) {
       trees.insert({&placed.shapes->touched, &placed.shapes->solid, &placed.shapes->glass});
       indices.insert(&placed.shapes->index);
@@ -117,6 +117,8 @@ bool has_type_of(const SceneGrid& grid, const std::vector<VoxelType>& ascending)
 void put_trees(const TreeCache& trees, PlacedGrid& placed) {
   placed.opaque = &trees.opaque();
   placed.transparent = trees.transparent();
+  placed.glass_voxels = trees.glass_voxels();
+  placed.face_cells = trees.face_cells();
   placed.shapes = trees.shapes();
   placed.field = trees.field();
   placed.opaque_field = trees.opaque_field();
@@ -180,21 +182,30 @@ void SceneTracer::Impl::refer_to(const Scene& other) noexcept {
 // Returns false if there are none.
 bool SceneTracer::Impl::update_types(const TypeChanges& changes) {
   std::vector<VoxelType> changed;
+  std::vector<VoxelType> recoloured;
   for (const TypeChange& change : changes.items_unless_all()) {
     // Textures decide which parts of shapes are glass.
     const bool has_other_looks = change.colour_changed && scene->types.is_shaped(change.type);
     if (change.visibility_changed || change.shape_changed || has_other_looks) changed.push_back(change.type);
+    if (change.colour_changed && scene->types.is_transparent(change.type)) recoloured.push_back(change.type);
   }
-  if (!has_other_visibility(changes) && changed.empty()) return false;
+  if (!has_other_visibility(changes) && changed.empty() && recoloured.empty()) return false;
   std::vector<GridHandle> kept;
   bool has_forgotten = false;
   for (const auto& each : grids) {
     if (each == nullptr) continue;
-    // An edit may have removed the last voxel of such a type.
+    std::vector<VoxelType> other = changed;
+    for (const VoxelType type : recoloured) {
+      if (each->trees.has_other_cells(scene->types, type)) other.push_back(type);
+    }
+    std::ranges::sort(other);
     const SceneGrid* grid = scene->grids().find(each->handle);
-    if (changes.all || grid == nullptr || grid->grid.has_changed_since(each->trees.followed()) ||
-        (each->trees.field() != nullptr && grid->field.has_changed_since(each->trees.followed_field())) ||
-        has_type_of(*grid, changed)) {
+    const bool is_unaffected = !changes.all && other.empty() && !has_other_visibility(changes);
+    // An edit may have removed the last voxel of such a type.
+    if (!is_unaffected &&
+        (changes.all || grid == nullptr || grid->grid.has_changed_since(each->trees.followed()) ||
+         (each->trees.field() != nullptr && grid->field.has_changed_since(each->trees.followed_field())) ||
+         has_type_of(*grid, other))) {
       each->trees.forget();
       has_forgotten = true;
     } else {

@@ -19,11 +19,11 @@ struct TracedGrid {
   const SceneGrid* grid = nullptr;
   DVec3 pivot{0.0};
   IBox tight;
-  bool can_be_placed = false;              ///< it is not empty, and its pivot is finite
-  bool is_placed = false;                  ///< by a traced instance
-  bool is_partial = false;                 ///< its voxels or its field
-  std::uint64_t shape = 0;                 ///< unique number; replaced when pivot or bounds change
-  TreeCache trees{ShapedVoxels::ByShape};  ///< up to date while it is placed
+  bool can_be_placed = false;               ///< it is not empty, and its pivot is finite
+  bool is_placed = false;                   ///< by a traced instance
+  bool is_partial = false;                  ///< its voxels or its field
+  std::uint64_t shape = 0;                  ///< unique number; replaced when pivot or bounds change
+  TreeCache trees{ShapedVoxels::ForSight};  ///< up to date while it is placed
 };
 
 struct SceneTracer::Impl {

@@ -11,6 +11,7 @@
 #include "grid/change_follower_for_tests.h"
 #include "live/allocations_for_tests.h"
 #include "scene/tracer/changing_scene_for_tests.h"
+#include "trace/tree_view.h"
 
 namespace quoin {
 namespace {
@@ -257,6 +258,116 @@ TEST(SceneUpdate, OtherConsumersMissNoChanges) {
   (void)follower.take(grid);
   tracer.update();
   EXPECT_FALSE(placed_in(tracer)[0].opaque->is_occupied({6, 5, 5}));
+}
+
+VoxelFaces faces_of(FaceAlpha alpha) {
+  AlphaImage image{16, 16, {}};
+  for (int i = 0; i < 256; ++i) {
+    image.rgba.insert(image.rgba.end(), {90, 160, 60, static_cast<std::uint8_t>(i % 2 == 0 ? 255 : 0)});
+  }
+  return VoxelFaces(VoxelFace{.texture = Texture::from_image("leaves", image).value(), .alpha = alpha});
+}
+
+// Leaves around a stone, and glass that a pane of a neighbouring voxel touches.
+struct LeavesAndGlass {
+  VoxelRegistry types;
+  Grid grid;
+  VoxelType stone = kAir;
+  VoxelType leaf = kAir;
+
+  LeavesAndGlass() {
+    stone = *types.add({.name = "stone"});
+    leaf = *types.add({.name = "leaf", .visibility = Visibility::Transparent, .faces = faces_of(FaceAlpha::Cutout)});
+    const VoxelType glass = *types.add({.name = "glass", .visibility = Visibility::Transparent});
+    VoxelProperties of_pane{.name = "pane", .visibility = Visibility::Transparent};
+    of_pane.shapes = *VoxelShape::from_elements({{.min = {-8, 4, 4}, .max = {8, 8, 8}}});
+    grid.fill_box({{5, 5, 5}, {12, 12, 12}}, leaf);
+    grid.set({7, 8, 8}, stone);
+    grid.fill_box({{16, 16, 16}, {32, 32, 32}}, glass);
+    grid.set({32, 20, 20}, *types.add(of_pane));
+  }
+};
+
+TEST(TreeCache, SplitsTransparentVoxelsForImages) {
+  LeavesAndGlass world;
+  TreeCache trees(ShapedVoxels::ForSight);
+  trees.update(world.grid, world.types);
+  ASSERT_NE(trees.glass_voxels(), nullptr);
+  ASSERT_NE(trees.face_cells(), nullptr);
+  EXPECT_TRUE(trees.transparent()->is_occupied({8, 8, 8}));
+  EXPECT_TRUE(trees.face_cells()->is_occupied({5, 8, 8}));
+  EXPECT_FALSE(trees.face_cells()->is_occupied({9, 8, 8})) << "leaves on all sides";
+  EXPECT_FALSE(trees.face_cells()->is_occupied({8, 8, 8})) << "leaves and a stone";
+  EXPECT_FALSE(trees.glass_voxels()->is_occupied({5, 8, 8}));
+  for (const IVec3 voxel : {IVec3{16, 16, 16}, IVec3{31, 20, 20}, IVec3{32, 20, 20}}) {
+    EXPECT_TRUE(trees.glass_voxels()->is_occupied(voxel));
+    EXPECT_FALSE(trees.face_cells()->is_occupied(voxel));
+  }
+  // The brick (1, 1, 1) is full of glass, but the pane touches the cell (3, 1, 1) of it.
+  const trace::ChunkNode* const node = trace::TreeNodes(*trees.glass_voxels()).find_chunk({0, 0, 0});
+  ASSERT_NE(node, nullptr);
+  const trace::UniformBlocks& blocks = trace::TreeNodes::uniform_blocks(*node);
+  EXPECT_EQ(~blocks.cells[21], std::uint64_t{1} << (3 + 4 + 16));
+  EXPECT_EQ(blocks.bricks, 0U);
+
+  world.grid.set({9, 8, 8}, kAir);
+  EXPECT_TRUE(trees.update(world.grid, world.types));
+  EXPECT_TRUE(trees.face_cells()->is_occupied({10, 8, 8}));
+  world.grid.fill_box({{5, 5, 5}, {12, 12, 12}}, kAir);
+  EXPECT_TRUE(trees.update(world.grid, world.types));
+  EXPECT_EQ(trees.face_cells(), nullptr);
+}
+
+TEST(TreeCache, KnowsWhenTexturesChangeTheKindOfVoxels) {
+  LeavesAndGlass world;
+  TreeCache trees(ShapedVoxels::ForSight);
+  trees.update(world.grid, world.types);
+  EXPECT_FALSE(trees.has_other_cells(world.types, world.leaf));
+  VoxelProperties leaf = world.types[world.leaf];
+  leaf.faces = faces_of(FaceAlpha::Translucent);
+  world.types.replace(world.leaf, leaf);
+  EXPECT_TRUE(trees.has_other_cells(world.types, world.leaf));
+  trees.forget();
+  trees.update(world.grid, world.types);
+  EXPECT_FALSE(trees.has_other_cells(world.types, world.leaf));
+  EXPECT_EQ(trees.face_cells(), nullptr);
+  EXPECT_TRUE(trees.glass_voxels()->is_occupied({8, 8, 8}));
+}
+
+// Worlds without shapes and cells of faces have no further trees.
+TEST(TreeCache, SharesTheTreeOfPlainGlass) {
+  VoxelRegistry types;
+  const VoxelType glass = *types.add({.name = "glass", .visibility = Visibility::Transparent});
+  Grid grid;
+  grid.set({1, 2, 3}, glass);
+  TreeCache trees(ShapedVoxels::ForSight);
+  trees.update(grid, types);
+  EXPECT_EQ(trees.glass_voxels(), trees.transparent());
+  EXPECT_EQ(trees.face_cells(), nullptr);
+}
+
+TEST(TreeCache, RecoversFromFailedUpdatesOfTreesForImages) {
+  int failures = 0;
+  for (int n = 0; n == failures; ++n) {
+    LeavesAndGlass world;
+    TreeCache trees(ShapedVoxels::ForSight);
+    trees.update(world.grid, world.types);
+    world.grid.set({9, 8, 8}, kAir);
+    world.grid.set({32, 20, 20}, kAir);
+    fail_allocation(n);
+    try {
+      trees.update(world.grid, world.types);
+    } catch (const std::bad_alloc&) {
+      ++failures;
+    }
+    fail_allocation(-1);
+    trees.update(world.grid, world.types);
+    ASSERT_NE(trees.face_cells(), nullptr) << n;
+    ASSERT_TRUE(trees.face_cells()->is_occupied({10, 8, 8})) << n;
+    ASSERT_FALSE(trees.glass_voxels()->is_occupied({32, 20, 20})) << n;
+    ASSERT_TRUE(trees.glass_voxels()->is_occupied({31, 20, 20})) << n;
+  }
+  EXPECT_GT(failures, 10);
 }
 
 // A state turns a beam away from a chunk that it touched before: no trees keep its old voxels, also if memory runs out.

@@ -75,8 +75,7 @@ bool has_opaque(const PlacedGrid& placed) {
 }
 
 bool has_transparent(const PlacedGrid& placed) {
-  return placed.transparent != nullptr || placed.glass != nullptr ||
-         (placed.shapes != nullptr && placed.shapes->has_glass());
+  return placed.glass_voxels != nullptr || placed.face_cells != nullptr || placed.glass != nullptr;
 }
 
 // Adds the rays that hit the opaque field of a placed grid to `blocked`, the rays that hit its voxels. Rays are in its
@@ -90,9 +89,9 @@ std::uint32_t blocked_by_field(const PlacedGrid& placed, const RayPacket& rays_i
 
 // Sets `blocked[i]` to the rays of packet i that hit an opaque voxel or shape of a placed grid. They are in its space.
 void find_blocked(const PlacedGrid& placed, const VoxelRegistry& types, std::span<const RayPacket> packets_in_grid,
-                  std::span<std::uint32_t> blocked) {
+                  std::span<std::uint32_t> blocked, MostRays expected) {
   if (placed.shapes != nullptr) {
-    return any_solids(*placed.shapes, *placed.opaque, *placed.voxels, types, packets_in_grid, blocked);
+    return any_solids(*placed.shapes, *placed.opaque, *placed.voxels, types, packets_in_grid, blocked, expected);
   }
   if (has_opaque(placed)) return quoin::any_hits(*placed.opaque, packets_in_grid, blocked);
   std::fill_n(blocked.begin(), packets_in_grid.size(), 0U);
@@ -132,6 +131,7 @@ struct SceneView::Impl {
   bool is_alone = false;                // there is one instance
   PacketTree with_glass;                // the `instances` with transparent contents, if there are several
   std::vector<std::size_t> glass;       // their indices
+  bool has_cells = false;               // any of them has cells of faces
 
   void find_glass_instances() {
     const BlockVector<PlacedGrid>& placed = placed_in(*tracer);
@@ -139,24 +139,53 @@ struct SceneView::Impl {
     for (std::size_t i = 0; i < placed.size(); ++i) {
       left_out[i] = !has_transparent(placed[i]);
       if (!left_out[i]) glass.push_back(i);
+      has_cells |= placed[i].face_cells != nullptr;
     }
     if (glass.size() > 1) with_glass = PacketTree(tracer->impl().instances, origin, left_out);
   }
 
   // Returns the rays in view space that hit a transparent voxel or field of the instance.
   [[nodiscard]] std::uint32_t meet_glass(std::size_t index, std::uint32_t near, const RayPacket& in_view,
-                                         RayPacket& room) const {
+                                         RayPacket& room, bool with_faces) const {
     QUOIN_ASSERT(index < grid_from_view.size() && is_current(), "an instance of a tracer that was not updated since");
     const PlacedGrid& placed = placed_in(*tracer)[index];
     move(grid_from_view[index], in_view, room);
     room.active = near;
-    std::uint32_t met = placed.transparent == nullptr ? 0 : quoin::any_hits(*placed.transparent, room);
+    std::uint32_t met = placed.glass_voxels == nullptr ? 0 : quoin::any_hits(*placed.glass_voxels, room);
+    if (with_faces && placed.face_cells != nullptr) {
+      room.active &= ~met;
+      met |= quoin::any_hits(*placed.face_cells, room);
+    }
+    if (placed.glass == nullptr) return met;
     room.active &= ~met;
-    if (placed.glass != nullptr) met |= quoin::any_hits(placed.glass->cells(), room);
-    if (placed.shapes == nullptr) return met;
-    room.active &= ~met;
-    return met | quoin::any_hits(placed.shapes->glass, room);
+    return met | quoin::any_hits(placed.glass->cells(), room);
   }
+  // Returns true if `meet_through` finds more than `any_transparent`.
+  [[nodiscard]] bool has_first_hits() const {
+    if (!is_alone || glass.empty()) return false;
+    const PlacedGrid& placed = placed_in(*tracer).front();
+    return placed.shapes != nullptr || placed.face_cells != nullptr;
+  }
+  // Fills in the hits of rays in the space of the only instance of the scene, `hits.rays`.
+  void meet_through(bool with_faces, ThroughHits& hits) const {
+    const PlacedGrid& placed = placed_in(*tracer).front();
+    hits.has_first = true;
+    hits.first_glass.hit = hits.first_faces.hit = 0;
+    if (placed.glass_voxels != nullptr && placed.shapes != nullptr) {
+      first_glass(*placed.shapes, *placed.glass_voxels, hits.rays, hits.first_glass);
+    } else if (placed.glass_voxels != nullptr) {
+      quoin::first_hits(*placed.glass_voxels, hits.rays, hits.first_glass);
+    }
+    if (with_faces && placed.face_cells != nullptr) {
+      quoin::first_hits(*placed.face_cells, hits.rays, hits.first_faces);
+    }
+    hits.glass = hits.first_glass.hit;
+    hits.faces = hits.first_faces.hit;
+    if (placed.glass != nullptr) hits.glass |= quoin::any_hits(placed.glass->cells(), hits.rays);
+  }
+  [[nodiscard]] std::uint32_t any_transparent(const RayPacket& rays_in_view, bool with_faces) const;
+  void find_blocked(std::int32_t home, std::span<const RayPacket> packets_in_grid, std::span<std::uint32_t> blocked,
+                    MostRays expected) const;
   // Returns `blocked` and the other rays, in the space of grid `own`, that hit another instance.
   [[nodiscard]] std::uint32_t blocked_by_others(std::size_t own, const RayPacket& rays_in_grid,
                                                 std::uint32_t blocked) const;
@@ -342,22 +371,27 @@ void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const
   });
 }
 
-std::uint32_t SceneView::any_hits(std::int32_t home, const RayPacket& rays_in_grid) const {
+std::uint32_t SceneView::any_hits(std::int32_t home, const RayPacket& rays_in_grid, MostRays expected) const {
   std::uint32_t blocked = 0;
-  any_hits(home, std::span(&rays_in_grid, 1), std::span(&blocked, 1));
+  impl_->find_blocked(home, std::span(&rays_in_grid, 1), std::span(&blocked, 1), expected);
   return blocked;
 }
 
 void SceneView::any_hits(std::int32_t home, std::span<const RayPacket> packets_in_grid,
                          std::span<std::uint32_t> blocked) const {
-  const BlockVector<PlacedGrid>& placed = placed_in(*impl_->tracer);
+  impl_->find_blocked(home, packets_in_grid, blocked, MostRays::Miss);
+}
+
+void SceneView::Impl::find_blocked(std::int32_t home, std::span<const RayPacket> packets_in_grid,
+                                   std::span<std::uint32_t> blocked, MostRays expected) const {
+  const BlockVector<PlacedGrid>& placed = placed_in(*tracer);
   const auto own = static_cast<std::size_t>(home);
-  QUOIN_ASSERT(own < placed.size() && impl_->is_current(), "a placed grid of a tracer that was not updated since");
+  QUOIN_ASSERT(own < placed.size() && is_current(), "a placed grid of a tracer that was not updated since");
   QUOIN_ASSERT(blocked.size() >= packets_in_grid.size(), "a mask for every packet");
-  find_blocked(placed[own], impl_->tracer->scene().types, packets_in_grid, blocked);
+  quoin::find_blocked(placed[own], tracer->scene().types, packets_in_grid, blocked, expected);
   for (std::size_t i = 0; i < packets_in_grid.size(); ++i) {
     blocked[i] = blocked_by_field(placed[own], packets_in_grid[i], blocked[i]);
-    if (!impl_->is_alone) blocked[i] = impl_->blocked_by_others(own, packets_in_grid[i], blocked[i]);
+    if (!is_alone) blocked[i] = blocked_by_others(own, packets_in_grid[i], blocked[i]);
   }
 }
 
@@ -387,21 +421,91 @@ std::uint32_t SceneView::Impl::blocked_by_others(std::size_t own, const RayPacke
   return blocked;
 }
 
-std::uint32_t SceneView::any_transparent(const RayPacket& rays_in_view) const {
-  if (rays_in_view.active == 0 || impl_->glass.empty()) return 0;
+std::uint32_t SceneView::Impl::any_transparent(const RayPacket& rays_in_view, bool with_faces) const {
+  if (rays_in_view.active == 0 || glass.empty()) return 0;
   RoomFor<RayPacket> room_for_rays;
-  if (impl_->glass.size() == 1) {
-    return impl_->meet_glass(impl_->glass.front(), rays_in_view.active, rays_in_view, *room_for_rays);
+  if (glass.size() == 1) {
+    return meet_glass(glass.front(), rays_in_view.active, rays_in_view, *room_for_rays, with_faces);
   }
   RayPacket left = rays_in_view;
   const PacketBounds bounds(left);
   LanesWhenNeeded lanes(left, bounds);
-  impl_->with_glass.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
+  with_glass.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
     const std::uint32_t near = (*lanes).meet(boxes, box) & left.active;
-    if (near != 0) left.active &= ~impl_->meet_glass(i, near, left, *room_for_rays);
+    if (near != 0) left.active &= ~meet_glass(i, near, left, *room_for_rays, with_faces);
     return left.active != 0;
   });
   return rays_in_view.active & ~left.active;
+}
+
+std::uint32_t SceneView::any_transparent(const RayPacket& rays_in_view) const {
+  return impl_->any_transparent(rays_in_view, true);
+}
+
+void SceneView::find_through(const RayPacket& rays_in_view, ThroughHits& hits) const {
+  if (impl_->has_first_hits()) {
+    move(impl_->grid_from_view.front(), rays_in_view, hits.rays);
+    return impl_->meet_through(true, hits);
+  }
+  hits.has_first = false;
+  hits.rays = rays_in_view;
+  hits.faces = 0;
+  hits.glass = impl_->any_transparent(rays_in_view, true);
+}
+
+void SceneView::find_glass(std::int32_t home, const RayPacket& rays_in_grid, ThroughHits& hits) const {
+  QUOIN_ASSERT(static_cast<std::size_t>(home) < placed_in(*impl_->tracer).size(), "a placed grid");
+  if (impl_->has_first_hits()) {
+    hits.rays = rays_in_grid;
+    return impl_->meet_through(false, hits);
+  }
+  hits.has_first = false;
+  hits.faces = 0;
+  move(impl_->view_from_grid[static_cast<std::size_t>(home)], rays_in_grid, hits.rays);
+  hits.glass = impl_->any_transparent(hits.rays, false);
+}
+
+std::uint32_t SceneView::visit_face_cells(
+    std::int32_t home, const RayPacket& rays_in_grid,
+    FunctionRef<std::uint32_t(std::int32_t, const RayPacket&, const PacketHits&)> visit) const {
+  const BlockVector<PlacedGrid>& placed = placed_in(*impl_->tracer);
+  const auto own = static_cast<std::size_t>(home);
+  QUOIN_ASSERT(own < placed.size() && impl_->is_current(), "a placed grid of a tracer that was not updated since");
+  RoomFor<PacketHits> room_for_hits;
+  PacketHits& first = *room_for_hits;
+  const auto visit_one = [&](std::size_t i, const RayPacket& rays) {
+    if (placed[i].face_cells == nullptr) return std::uint32_t{0};
+    // Most rays miss, and the kernel that finds no distances is faster.
+    const std::uint32_t met = quoin::any_hits(*placed[i].face_cells, rays);
+    if (met == 0) return std::uint32_t{0};
+    RoomFor<RayPacket> room;
+    RayPacket& meeting = *room;
+    meeting = rays;
+    meeting.active = met;
+    quoin::first_hits(*placed[i].face_cells, meeting, first);
+    return visit(static_cast<std::int32_t>(i), meeting, first);
+  };
+  std::uint32_t ended = visit_one(own, rays_in_grid);
+  if (impl_->is_alone || !impl_->has_cells || ended == rays_in_grid.active) return ended;
+  RayPacket left = view_from_grid(home, rays_in_grid);
+  left.active &= ~ended;
+  const PacketBounds bounds(left);
+  LanesWhenNeeded lanes(left, bounds);
+  RoomFor<RayPacket> room_for_rays;
+  RayPacket& rays = *room_for_rays;
+  const PacketTree& instances = impl_->glass.size() > 1 ? impl_->with_glass : impl_->instances;
+  instances.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
+    if (i == own || placed[i].face_cells == nullptr) return true;
+    const std::uint32_t near = (*lanes).meet(boxes, box) & left.active;
+    if (near == 0) return true;
+    move(impl_->grid_from_view[i], left, rays);
+    rays.active = near;
+    const std::uint32_t found = visit_one(i, rays);
+    ended |= found;
+    left.active &= ~found;
+    return left.active != 0;
+  });
+  return ended;
 }
 
 void SceneView::visit_transparent(const Ray& ray_in_view, double max_t,

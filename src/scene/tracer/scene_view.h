@@ -41,6 +41,17 @@ struct SceneHits {
   [[nodiscard]] Vec3 normal(std::size_t lane) const { return {normal_x[lane], normal_y[lane], normal_z[lane]}; }
 };
 
+/// The rays of a packet that may meet transparent content.
+struct ThroughHits {
+  RayPacket rays;           ///< in view space, or in that of the only grid of the scene (`has_first`)
+  std::uint32_t glass = 0;  ///< lanes that hit voxels with glass or field cells
+  std::uint32_t faces = 0;  ///< lanes that hit cells of faces
+  /// The scene has one grid, with shapes or cells of faces: the first voxels that the rays hit are known.
+  bool has_first = false;
+  PacketHits first_glass;
+  PacketHits first_faces;
+};
+
 /// Traces rays through a scene, relative to a point near the rays.
 ///
 /// Spaces: view, the world's axes and units with `origin` in the middle, so that rays are as exact 10^9 away from the
@@ -68,7 +79,8 @@ class SceneView {
 
   /// Returns the rays that hit an opaque voxel, visible part of a shape or field of any instance. They are in the
   /// space of grid `home`, which is tested first.
-  [[nodiscard]] std::uint32_t any_hits(std::int32_t home, const RayPacket& rays_in_grid) const;
+  [[nodiscard]] std::uint32_t any_hits(std::int32_t home, const RayPacket& rays_in_grid,
+                                       MostRays expected = MostRays::Miss) const;
   /// Sets `blocked[i]` to the result of `any_hits` for packet i. Faster than one by one for endless rays.
   /// Requires: at least as many elements in `blocked` as packets.
   void any_hits(std::int32_t home, std::span<const RayPacket> packets_in_grid, std::span<std::uint32_t> blocked) const;
@@ -76,6 +88,17 @@ class SceneView {
   /// Returns the rays that hit a transparent voxel of any instance, or a voxel or field cell that may contain
   /// transparent parts of a shape or transparent material.
   [[nodiscard]] std::uint32_t any_transparent(const RayPacket& rays_in_view) const;
+  /// As above, with more about them.
+  void find_through(const RayPacket& rays_in_view, ThroughHits& hits) const;
+  /// As above, for rays in the space of grid `home`, without cells of faces.
+  void find_glass(std::int32_t home, const RayPacket& rays_in_grid, ThroughHits& hits) const;
+  /// Calls `visit` for each instance whose cells of faces some of the rays may hit, beginning with grid `home`, in whose
+  /// space the rays are. Passes an index into SceneTracer::placed, the rays in its space, and the first cells that they
+  /// hit; `visit` returns the rays that end there, which other instances need not look at. Returns all these rays.
+  std::uint32_t visit_face_cells(
+      std::int32_t home, const RayPacket& rays_in_grid,
+      FunctionRef<std::uint32_t(std::int32_t placed, const RayPacket& rays_in_grid, const PacketHits& first)> visit)
+      const;
 
   /// Calls `visit` for each instance with transparent voxels or transparent field parts that one ray may hit before
   /// `max_t`. Passes an index into SceneTracer::placed and the ray in the grid's space.

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include <glm/common.hpp>
@@ -19,79 +20,12 @@
 namespace quoin {
 namespace {
 
-constexpr double kFar = std::numeric_limits<double>::infinity();
 // A side that lies in the plane between two cells may be found in either: the rounding of both distances, in voxels.
 constexpr double kBetweenCells = 1e-6;
 
 double component(const Vec3& a, const DVec3& b) {
   return double{a.x} * b.x + double{a.y} * b.y + double{a.z} * b.z;
 }
-
-Direction side_of(int axis, bool is_upper) {
-  return static_cast<Direction>(2 * axis + (is_upper ? 0 : 1));
-}
-
-// A ray in the space of a box.
-class BoxRay {
- public:
-  BoxRay(const DVec3& origin, const DVec3& direction) : origin_(origin), inverse_(1.0 / direction) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto i = static_cast<std::size_t>(axis);
-      const bool is_backward = std::signbit(inverse_[axis]);
-      near_[i] = static_cast<std::uint32_t>(axis + (is_backward ? 3 : 0));
-      far_[i] = static_cast<std::uint32_t>(axis + (is_backward ? 0 : 3));
-      has_still_axis_ |= std::isinf(inverse_[axis]);
-    }
-  }
-
-  void set_origin(const DVec3& origin) { origin_ = origin; }
-  // Returns the inverse of the direction's components: infinite where they are 0.
-  [[nodiscard]] const DVec3& inverse() const { return inverse_; }
-
-  // Finds the way through a box as far as it lies between `least` and `most`. Returns false if there is none.
-  [[nodiscard]] bool cross(const ListedBox& box, double least, double most, ShapeSpan::End& enter_end,
-                           ShapeSpan::End& exit_end) const {
-    std::array<double, 3> near;
-    std::array<double, 3> far;
-    double enter = -kFar;
-    double exit = kFar;
-    // No branches: rays through small boxes miss about as often as they hit. A distance that is NaN, since the ray runs
-    // in the plane, does not count.
-    for (std::size_t i = 0; i < 3; ++i) {
-      near[i] = (box.planes[near_[i]] - of(origin_, i)) * of(inverse_, i);
-      far[i] = (box.planes[far_[i]] - of(origin_, i)) * of(inverse_, i);
-      enter = near[i] > enter ? near[i] : enter;
-      exit = far[i] < exit ? far[i] : exit;
-    }
-    if (!((enter > least ? enter : least) <= (exit < most ? exit : most))) return false;
-    if (has_still_axis_ && runs_in_plate(box)) return false;
-    // If a ray crosses several planes at once, the last one counts, as for voxels.
-    const std::size_t enter_axis = near[2] == enter ? 2 : near[1] == enter ? 1 : 0;
-    const std::size_t exit_axis = far[0] == exit ? 0 : far[1] == exit ? 1 : 2;
-    if (enter == exit ? enter_axis != exit_axis : exit == 0.0) return false;
-    const Direction enter_side = side_of(static_cast<int>(enter_axis), near_[enter_axis] >= 3);
-    const Direction exit_side = side_of(static_cast<int>(exit_axis), near_[exit_axis] < 3);
-    enter_end = {enter, box.box->faces[static_cast<std::size_t>(enter_side)], enter_side};
-    exit_end = {exit, box.box->faces[static_cast<std::size_t>(exit_side)], exit_side};
-    return true;
-  }
-
- private:
-  static double of(const DVec3& v, std::size_t i) { return glm::value_ptr(v)[i]; }
-  [[nodiscard]] bool runs_in_plate(const ListedBox& box) const {
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (std::isinf(of(inverse_, i)) && box.planes[i] == box.planes[i + 3]) return true;
-    }
-    return false;
-  }
-
-  DVec3 origin_;
-  DVec3 inverse_;
-  // Indices in ListedBox::planes of the planes that the ray meets first and last.
-  std::array<std::uint32_t, 3> near_{};
-  std::array<std::uint32_t, 3> far_{};
-  bool has_still_axis_ = false;
-};
 
 // Returns a ray, relative to the shape's voxel, in the space of a turned box.
 BoxRay turned(const ModelBox& box, const Ray& ray) {
@@ -357,11 +291,10 @@ Rgba8 shape_texel(const ModelFace& face, const VoxelFace& look, const DVec3& poi
   return look.texture.level(0)[texel_number(uv[1], 1.0, size) * std::size_t{size} + texel_number(uv[0], 1.0, size)];
 }
 
-void visit_shape(const ShapesAtVoxel& here, const ListedShape& shape, const Ray& ray_in_grid,
+void visit_shape(const ShapesAtVoxel& here, const ListedShape& shape, const Ray& ray_in_grid, BoxRay& straight,
                  FunctionRef<void(const ShapeSpan&)> visit) {
-  BoxRay straight(ray_in_grid.origin, ray_in_grid.direction);
   const PlacedShape placed{shape.voxel(here.voxel()), shape.type, shape.model};
-  cross_shape(here, shape, ray_in_grid, straight, 0.0, kFar,
+  cross_shape(here, shape, ray_in_grid, straight, 0.0, std::numeric_limits<double>::infinity(),
               [&](const ModelBox* box, const ShapeSpan::End& enter, const ShapeSpan::End& exit) {
                 visit({placed, box, enter, exit});
               });
@@ -388,6 +321,28 @@ struct Entry {
   double t;
   int axis;
 };
+
+// Adds the rest of a ray that enters a voxel to a packet. Its origin is within the voxel, for any rounding.
+void keep_rest(const Ray& ray, const Entry& entry, double max_t, int lane, RayPacket& rest) {
+  const auto i = static_cast<std::size_t>(lane);
+  DVec3 at = ray.origin + entry.t * ray.direction;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = entry.voxel[axis];
+    const double high = low + (1.0 - 0x1p-20);
+    if (axis == entry.axis) at[axis] = ray.direction[axis] > 0.0 ? low : high;
+    at[axis] = at[axis] < low ? low : at[axis] > high ? high : at[axis];
+  }
+  rest.origin_x[i] = at.x, rest.origin_y[i] = at.y, rest.origin_z[i] = at.z;
+  rest.max_t[i] = std::max(max_t - entry.t, 0.0);
+  rest.active |= 1U << lane;
+}
+
+// Returns the entry of a whole ray into a voxel that its rest enters through a face.
+Entry entry_through(const RayHit& hit, const Ray& ray, const DVec3& inverse) {
+  const int axis = frame_of(hit.face).axis;
+  const double plane = hit.voxel[axis] + (ray.direction[axis] > 0.0 ? 0.0 : 1.0);
+  return {hit.voxel, (plane - ray.origin[axis]) * inverse[axis], axis};
+}
 
 // The rays of a packet among the solids of a grid: opaque voxels and shapes. The rest of a ray that passes shapes
 // starts in the first voxel that no shape touches, so that the kernels for packets find its next solid. Neighbouring
@@ -459,10 +414,7 @@ class SolidRays {
   [[nodiscard]] const Entry& entry_of(int lane) const { return entries_[static_cast<std::size_t>(lane)]; }
   // Returns the entry into a voxel that the rest of a ray hits, by the whole ray's distance.
   [[nodiscard]] Entry entry_of(int lane, const RayHit& hit, const ShapeRay& ray, const Ray& in_grid) const {
-    if (hit.starts_inside) return entry_of(lane);
-    const int axis = frame_of(hit.face).axis;
-    const double plane = hit.voxel[axis] + (in_grid.direction[axis] > 0.0 ? 0.0 : 1.0);
-    return {hit.voxel, (plane - in_grid.origin[axis]) * ray.inverse()[axis], axis};
+    return hit.starts_inside ? entry_of(lane) : entry_through(hit, in_grid, ray.inverse());
   }
 
  private:
@@ -484,20 +436,9 @@ class SolidRays {
   }
 
   void keep_rest(int lane, const Ray& in_grid, double max_t) {
-    const auto i = static_cast<std::size_t>(lane);
-    const IVec3 voxel = walk_.voxel();
-    entries_[i] = {voxel, walk_.t(), walk_.axis()};
-    // Within the voxel, for any rounding.
-    DVec3 at = in_grid.origin + walk_.t() * in_grid.direction;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double low = voxel[axis];
-      const double high = low + (1.0 - 0x1p-20);
-      if (axis == walk_.axis()) at[axis] = in_grid.direction[axis] > 0.0 ? low : high;
-      at[axis] = at[axis] < low ? low : at[axis] > high ? high : at[axis];
-    }
-    rest_.origin_x[i] = at.x, rest_.origin_y[i] = at.y, rest_.origin_z[i] = at.z;
-    rest_.max_t[i] = std::max(max_t - walk_.t(), 0.0);
-    rest_.active |= 1U << lane;
+    Entry& entry = entries_[static_cast<std::size_t>(lane)];
+    entry = {walk_.voxel(), walk_.t(), walk_.axis()};
+    quoin::keep_rest(in_grid, entry, max_t, lane, rest_);
   }
 
   const VoxelRegistry& types_;
@@ -606,19 +547,18 @@ std::uint32_t first_solids(const TracedShapes& shapes, const Grid& voxels, const
 
 namespace {
 
-// Returns the rays of a packet, active in `rays`, that hit opaque voxels or visible parts of shapes. All hit opaque
-// voxels, or voxels that shapes touch.
-std::uint32_t blocked_rays(const TracedShapes& shapes, const OccupancyTree& opaque, const VoxelRegistry& types,
-                           const RayPacket& packet, std::uint32_t active, SolidRays& rays) {
+// Returns the rays of a packet, active in `rays`, that hit visible parts of shapes, or an opaque voxel whose hit rounds
+// differently. All hit voxels that shapes touch.
+std::uint32_t blocked_by_shapes(const TracedShapes& shapes, const VoxelRegistry& types, const RayPacket& packet,
+                                std::uint32_t active, SolidRays& rays) {
   using Way = SolidRays::Way;
   RayPacket& rest = rays.rest();
-  rest.active = active;
-  std::uint32_t blocked = any_hits(opaque, rest);
   rest.active = 0;
+  std::uint32_t blocked = 0;
   const auto take = [&](int lane, Way way) {
     if (way == Way::InShape || way == Way::InCube) blocked |= 1U << lane;
   };
-  for (std::uint32_t left = active & ~blocked; left != 0; left &= left - 1) {
+  for (std::uint32_t left = active; left != 0; left &= left - 1) {
     const int lane = std::countr_zero(left);
     const Ray in_grid = packet.ray(lane);
     ShapeRay ray(types, in_grid, packet.max_t[static_cast<std::size_t>(lane)], ShapeParts::Visible);
@@ -639,19 +579,96 @@ std::uint32_t blocked_rays(const TracedShapes& shapes, const OccupancyTree& opaq
 
 }  // namespace
 
-// Most rays that miss both kinds of solids are done after one tree. Of the others, most hit opaque voxels.
+namespace {
+
+// Returns true if a ray meets glass of the shapes that touch a voxel, at or after its origin.
+bool meets_glass(const TracedShapes& shapes, const ShapesAtVoxel& here, const Ray& ray, BoxRay& straight) {
+  bool is_met = false;
+  for (const ListedShape& shape : here.listed()) {
+    if (shape.type >= shapes.is_glass.size() || shapes.is_glass[shape.type] == 0) continue;
+    cross_shape(here, shape, ray, straight, 0.0, std::numeric_limits<double>::infinity(),
+                [&](const ModelBox*, const ShapeSpan::End&, const ShapeSpan::End&) { is_met = true; });
+  }
+  return is_met;
+}
+
+// Returns the entry of a ray into the voxel behind that of its origin.
+Entry entry_behind(const Ray& ray, IVec3 voxel, const DVec3& inverse) {
+  std::array<double, 3> next;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double plane = voxel[axis] + (ray.direction[axis] > 0.0 ? 1.0 : 0.0);
+    next[static_cast<std::size_t>(axis)] = ray.direction[axis] == 0.0 ? std::numeric_limits<double>::infinity()
+                                                                      : (plane - ray.origin[axis]) * inverse[axis];
+  }
+  int axis = next[0] <= next[1] ? 0 : 1;
+  if (next[2] < next[static_cast<std::size_t>(axis)]) axis = 2;
+  voxel[axis] += ray.direction[axis] > 0.0 ? 1 : -1;
+  return {voxel, next[static_cast<std::size_t>(axis)], axis};
+}
+
+}  // namespace
+
+void first_glass(const TracedShapes& shapes, const OccupancyTree& glass_voxels, const RayPacket& rays_in_grid,
+                 PacketHits& hits) {
+  first_hits(glass_voxels, rays_in_grid, hits);
+  if (hits.starts_inside == 0) return;
+  RayPacket rest = rays_in_grid;
+  rest.active = 0;
+  RayPacket::Lanes<Entry> entries;
+  ShapeIndex::Reader reader(shapes.index);
+  for (std::uint32_t left = hits.starts_inside; left != 0; left &= left - 1) {
+    const int lane = std::countr_zero(left);
+    const auto i = static_cast<std::size_t>(lane);
+    const IVec3 voxel{hits.x[i], hits.y[i], hits.z[i]};
+    const ShapesAtVoxel here = reader.at(voxel);
+    if (!here.has_own()) continue;  // or the voxel is a cube of glass
+    const Ray ray = rays_in_grid.ray(lane);
+    BoxRay straight(ray.origin, ray.direction);
+    if (meets_glass(shapes, here, ray, straight)) continue;
+    entries[i] = entry_behind(ray, voxel, straight.inverse());
+    hits.hit &= ~(1U << lane);
+    if (entries[i].t <= rays_in_grid.max_t[i]) keep_rest(ray, entries[i], rays_in_grid.max_t[i], lane, rest);
+  }
+  hits.starts_inside &= hits.hit;
+  if (rest.active == 0) return;
+  PacketHits next;
+  first_hits(glass_voxels, rest, next);
+  for (std::uint32_t left = next.hit; left != 0; left &= left - 1) {
+    const int lane = std::countr_zero(left);
+    const Ray ray = rays_in_grid.ray(lane);
+    const RayHit hit = next[lane];
+    const Entry entry =
+        hit.starts_inside ? entries[static_cast<std::size_t>(lane)] : entry_through(hit, ray, 1.0 / ray.direction);
+    hits.set(lane, {entry.voxel, side_of(entry.axis, ray.direction[entry.axis] < 0.0), entry.t, false});
+  }
+}
+
+// Rays that miss both kinds of solids are done after one tree, or rays that hit opaque voxels are.
 void any_solids(const TracedShapes& shapes, const OccupancyTree& opaque, const Grid& voxels, const VoxelRegistry& types,
-                std::span<const RayPacket> packets_in_grid, std::span<std::uint32_t> blocked) {
-  any_hits(shapes.solid, packets_in_grid, blocked);
-  std::size_t number = 0;
-  while (number < packets_in_grid.size() && blocked[number] == 0) ++number;
-  if (number == packets_in_grid.size()) return;
-  SolidRays rays(shapes, voxels, types, packets_in_grid[number]);
-  for (const std::size_t first = number; number < packets_in_grid.size(); ++number) {
-    if (blocked[number] == 0) continue;
+                std::span<const RayPacket> packets_in_grid, std::span<std::uint32_t> blocked, MostRays expected) {
+  const bool begins_with_opaque = expected == MostRays::Hit;
+  const OccupancyTree& other = begins_with_opaque ? shapes.solid : opaque;
+  any_hits(begins_with_opaque ? opaque : shapes.solid, packets_in_grid, blocked);
+  std::optional<SolidRays> rays;
+  for (std::size_t number = 0; number < packets_in_grid.size(); ++number) {
     const RayPacket& packet = packets_in_grid[number];
-    if (number != first) rays.set_packet(packet);
-    blocked[number] = blocked_rays(shapes, opaque, types, packet, blocked[number], rays);
+    std::uint32_t left = begins_with_opaque ? packet.active & ~blocked[number] : blocked[number];
+    if (left == 0) continue;
+    if (rays) {
+      rays->set_packet(packet);
+    } else {
+      rays.emplace(shapes, voxels, types, packet);
+    }
+    rays->rest().active = left;
+    const std::uint32_t met = any_hits(other, rays->rest());
+    std::uint32_t touching = 0;  // voxels that shapes touch, before any opaque ones
+    if (begins_with_opaque) {
+      touching = met;
+    } else {
+      blocked[number] = met;
+      touching = left & ~met;
+    }
+    if (touching != 0) blocked[number] |= blocked_by_shapes(shapes, types, packet, touching, *rays);
   }
 }
 

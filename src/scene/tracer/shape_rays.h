@@ -1,9 +1,13 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
+
+#include <glm/gtc/type_ptr.hpp>
 
 #include <quoin/core/direction.h>
 #include <quoin/core/function_ref.h>
@@ -40,10 +44,77 @@ struct ShapeSpan {
   [[nodiscard]] Vec3 normal(const End& end) const;
 };
 
+/// Returns the upper or lower direction of an axis.
+[[nodiscard]] inline Direction side_of(int axis, bool is_upper) {
+  return static_cast<Direction>(2 * axis + (is_upper ? 0 : 1));
+}
+
+/// A ray in the space of a box.
+class BoxRay {
+ public:
+  BoxRay(const DVec3& origin, const DVec3& direction) : origin_(origin), inverse_(1.0 / direction) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto i = static_cast<std::size_t>(axis);
+      const bool is_backward = std::signbit(inverse_[axis]);
+      near_[i] = static_cast<std::uint32_t>(axis + (is_backward ? 3 : 0));
+      far_[i] = static_cast<std::uint32_t>(axis + (is_backward ? 0 : 3));
+      has_still_axis_ |= std::isinf(inverse_[axis]);
+    }
+  }
+
+  void set_origin(const DVec3& origin) { origin_ = origin; }
+  // Returns the inverse of the direction's components: infinite where they are 0.
+  [[nodiscard]] const DVec3& inverse() const { return inverse_; }
+
+  // Finds the way through a box as far as it lies between `least` and `most`. Returns false if there is none.
+  [[nodiscard]] bool cross(const ListedBox& box, double least, double most, ShapeSpan::End& enter_end,
+                           ShapeSpan::End& exit_end) const {
+    std::array<double, 3> near;
+    std::array<double, 3> far;
+    double enter = -std::numeric_limits<double>::infinity();
+    double exit = std::numeric_limits<double>::infinity();
+    // No branches: rays through small boxes miss about as often as they hit. A distance that is NaN, since the ray runs
+    // in the plane, does not count.
+    for (std::size_t i = 0; i < 3; ++i) {
+      near[i] = (box.planes[near_[i]] - of(origin_, i)) * of(inverse_, i);
+      far[i] = (box.planes[far_[i]] - of(origin_, i)) * of(inverse_, i);
+      enter = near[i] > enter ? near[i] : enter;
+      exit = far[i] < exit ? far[i] : exit;
+    }
+    if (!((enter > least ? enter : least) <= (exit < most ? exit : most))) return false;
+    if (has_still_axis_ && runs_in_plate(box)) return false;
+    // If a ray crosses several planes at once, the last one counts, as for voxels.
+    const std::size_t enter_axis = near[2] == enter ? 2 : near[1] == enter ? 1 : 0;
+    const std::size_t exit_axis = far[0] == exit ? 0 : far[1] == exit ? 1 : 2;
+    if (enter == exit ? enter_axis != exit_axis : exit == 0.0) return false;
+    const Direction enter_side = side_of(static_cast<int>(enter_axis), near_[enter_axis] >= 3);
+    const Direction exit_side = side_of(static_cast<int>(exit_axis), near_[exit_axis] < 3);
+    enter_end = {enter, box.box->faces[static_cast<std::size_t>(enter_side)], enter_side};
+    exit_end = {exit, box.box->faces[static_cast<std::size_t>(exit_side)], exit_side};
+    return true;
+  }
+
+ private:
+  static double of(const DVec3& v, std::size_t i) { return glm::value_ptr(v)[i]; }
+  [[nodiscard]] bool runs_in_plate(const ListedBox& box) const {
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (std::isinf(of(inverse_, i)) && box.planes[i] == box.planes[i + 3]) return true;
+    }
+    return false;
+  }
+
+  DVec3 origin_;
+  DVec3 inverse_;
+  // Indices in ListedBox::planes of the planes that the ray meets first and last.
+  std::array<std::uint32_t, 3> near_{};
+  std::array<std::uint32_t, 3> far_{};
+  bool has_still_axis_ = false;
+};
+
 /// Finds the ways of a ray through the boxes of one of the shapes that touch a voxel: all that end at or after t = 0,
 /// in the order of the boxes. A ray that only touches an edge meets nothing. Precision: double, relative to the shape's
-/// voxel.
-void visit_shape(const ShapesAtVoxel& here, const ListedShape& shape, const Ray& ray_in_grid,
+/// voxel. `straight`: the ray, from any origin.
+void visit_shape(const ShapesAtVoxel& here, const ListedShape& shape, const Ray& ray_in_grid, BoxRay& straight,
                  FunctionRef<void(const ShapeSpan&)> visit);
 
 /// A surface of a shape that a ray meets, in the space of its grid. Without default values, so that packets of them
@@ -89,9 +160,19 @@ bool first_shape(const TracedShapes& shapes, const VoxelRegistry& types, const R
 /// shapes, with their entries in `in_shapes`. `voxels`: the grid with the shapes.
 std::uint32_t first_solids(const TracedShapes& shapes, const Grid& voxels, const VoxelRegistry& types,
                            const RayPacket& rays_in_grid, PacketHits& hits, RayPacket::Lanes<ShapeHit>& in_shapes);
+/// Finds the first voxel in which each active ray of a packet meets glass, of `glass_voxels` (SightTrees::glass). Skips
+/// the voxel where a ray starts if it misses the shapes there, as above the surface of water.
+void first_glass(const TracedShapes& shapes, const OccupancyTree& glass_voxels, const RayPacket& rays_in_grid,
+                 PacketHits& hits);
+/// What most rays of a packet are expected to do. Changes their cost, not their results.
+enum class MostRays : std::uint8_t {
+  Miss,  ///< as rays of occlusion
+  Hit,   ///< opaque voxels, as rays to lamps behind walls
+};
 /// Sets `blocked[i]` to the rays of packet i that hit opaque voxels or visible parts of shapes. `opaque`: the tree of
 /// the opaque voxels of `voxels`. Requires: as many elements in `blocked` as packets.
 void any_solids(const TracedShapes& shapes, const OccupancyTree& opaque, const Grid& voxels, const VoxelRegistry& types,
-                std::span<const RayPacket> packets_in_grid, std::span<std::uint32_t> blocked);
+                std::span<const RayPacket> packets_in_grid, std::span<std::uint32_t> blocked,
+                MostRays expected = MostRays::Miss);
 
 }  // namespace quoin

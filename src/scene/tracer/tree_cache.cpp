@@ -206,28 +206,38 @@ bool has_glass(const DensityGrid& field, const VoxelRegistry& types, const Densi
 bool TreeCache::update(const Grid& grid, const VoxelRegistry& types) {
   PendingChanges changes(followed_, grid);
   if (changes->all) transparent_.reset();
-  const bool has_other_shapes = update_shapes(grid, types, *changes);
-  if (changes->empty()) return has_other_shapes;
-  opaque_.update(grid, types, *changes);
-  if (!has_other_shapes) update_transparent(grid, types, *changes);
+  const std::optional<std::vector<IVec3>> with_other_shapes = update_shapes(grid, types, *changes);
+  if (changes->empty() && !with_other_shapes) return false;
+  if (!changes->empty()) {
+    opaque_.update(grid, types, *changes);
+    if (!with_other_shapes) update_transparent(grid, types, *changes);
+  }
+  if (changes->all) sight_.reset();
+  if (shaped_ == ShapedVoxels::ForSight) {
+    // If this fails, the trees differ: the next update makes all again.
+    const ChangeCursor followed = std::exchange(followed_, {});
+    update_sight(grid, types, with_other_shapes ? *with_other_shapes : changes->chunks(grid));
+    followed_ = followed;
+  }
   changes.commit();
   return true;
 }
 
-// If there were no shapes, only the changed chunks can contain some. Returns true if it has updated the trees of shapes
-// and of transparent cubes.
-bool TreeCache::update_shapes(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) {
-  if (shaped_ == ShapedVoxels::AsCubes || (!types.has_shapes() && shapes_ == nullptr)) return false;
+// If there were no shapes, only the changed chunks can contain some. Returns the chunks whose opaque or touched voxels
+// may have changed if it has updated the trees of shapes and of transparent cubes.
+std::optional<std::vector<IVec3>> TreeCache::update_shapes(const Grid& grid, const VoxelRegistry& types,
+                                                           const GridChanges& changes) {
+  if (shaped_ == ShapedVoxels::AsCubes || (!types.has_shapes() && shapes_ == nullptr)) return std::nullopt;
   if (changes.all) shapes_.reset();
   const bool is_new = shapes_ == nullptr;
   if (is_new) {
-    if (changes.empty()) return false;
-    if (!has_new_types(grid, changes, [&](VoxelType type) { return types.is_shaped(type); })) return false;
+    if (changes.empty()) return std::nullopt;
+    if (!has_new_types(grid, changes, [&](VoxelType type) { return types.is_shaped(type); })) return std::nullopt;
     followed_data_ = {};
   }
   const GridData data{&grid};
   PendingChanges data_changes(followed_data_, data);
-  if (changes.empty() && data_changes->empty()) return false;
+  if (changes.empty() && data_changes->empty()) return std::nullopt;
   // If an update fails, the parts of `shapes_` differ: the next one makes all again, also without edits of voxels.
   const ChangeCursor followed = std::exchange(followed_, {});
   if (is_new) shapes_ = std::make_unique<TracedShapes>();
@@ -239,12 +249,109 @@ bool TreeCache::update_shapes(const Grid& grid, const VoxelRegistry& types, cons
   OpaqueRows solid_rows(grid, types, shapes);
   shapes_->solid.update(chunks_of_both(changed, changes.chunks(grid), is_new, grid), solid_rows);
   const auto glass_rows = [&](IVec3 first) { return glass_row(shapes, first); };
-  if (!shapes_->is_glass.empty()) shapes_->glass.update(changed, glass_rows);
-  update_glass_cubes(grid, types, chunks_of_both(changed, changes.chunks(grid), false, grid));
+  if (!shapes_->is_glass.empty() && shaped_ == ShapedVoxels::ByShape) shapes_->glass.update(changed, glass_rows);
+  std::vector<IVec3> all = chunks_of_both(changed, changes.chunks(grid), false, grid);
+  update_glass_cubes(grid, types, all);
   if (shapes_->index.empty()) shapes_.reset();
   data_changes.commit();
   followed_ = followed;
-  return true;
+  return all;
+}
+
+bool is_cell_of_faces(const VoxelRegistry& types, VoxelType type) {
+  if (!types.is_transparent(type) || types.is_shaped(type)) return false;
+  const VoxelFaces& faces = types[type].faces;
+  return !faces.empty() &&
+         std::ranges::any_of(kDirections, [&](Direction each) { return faces[each].alpha != FaceAlpha::Translucent; });
+}
+
+bool TreeCache::has_other_cells(const VoxelRegistry& types, VoxelType type) const {
+  const bool was_cell = sight_ != nullptr && type < sight_->is_cell.size() && sight_->is_cell[type] != 0;
+  return shaped_ == ShapedVoxels::ForSight && was_cell != is_cell_of_faces(types, type);
+}
+
+namespace {
+
+using ChunkBits = BlockVector<std::uint64_t>;  // rows along x by y + 64 z
+
+std::size_t row_number(int y, int z) {
+  return static_cast<std::size_t>(y + kChunkEdge * z);
+}
+
+void add_rows(const trace::ChunkRows& rows, ChunkBits& bits) {
+  if (rows.none()) return;
+  rows.for_each_row(kWholeChunk, [&](int y, int z, std::uint64_t row) { bits[row_number(y, z)] |= row; });
+}
+
+// Adds a chunk's voxels of one type of cells of faces. Leaves out those that `opaque` voxels and voxels of the type
+// surround: no side of them is drawn. Neighbours in other chunks count as different.
+void add_visible_cells(const Chunk& chunk, VoxelType type, const ChunkBits& opaque, ChunkBits& cells) {
+  ChunkBits own(opaque.size());
+  add_rows(trace::ChunkRows(chunk, type), own);
+  const auto hiding = [&](int y, int z) { return own[row_number(y, z)] | opaque[row_number(y, z)]; };
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      const std::uint64_t row = own[row_number(y, z)];
+      if (row == 0) continue;
+      std::uint64_t inner = 0;
+      if (y > 0 && z > 0 && y < kChunkEdge - 1 && z < kChunkEdge - 1) {
+        const std::uint64_t along = hiding(y, z);
+        inner = along << 1U & along >> 1U & hiding(y - 1, z) & hiding(y + 1, z) & hiding(y, z - 1) & hiding(y, z + 1);
+      }
+      cells[row_number(y, z)] |= row & ~inner;
+    }
+  }
+}
+
+}  // namespace
+
+void TreeCache::update_sight(const Grid& grid, const VoxelRegistry& types, std::vector<IVec3> chunks) {
+  std::vector<std::uint8_t> is_cell(types.has_textures() ? types.size() : 0);
+  for (std::size_t i = 0; i < is_cell.size(); ++i) {
+    is_cell[i] = is_cell_of_faces(types, static_cast<VoxelType>(i)) ? 1 : 0;
+  }
+  const auto counts_as_cell = [&](VoxelType type) { return type < is_cell.size() && is_cell[type] != 0; };
+  const auto has_cells = [&](IVec3 at) {
+    const Chunk* const chunk = grid.find_chunk(at);
+    return chunk != nullptr && std::ranges::any_of(chunk->types(), counts_as_cell);
+  };
+  const bool has_glass_shapes = shapes_ != nullptr && !shapes_->is_glass.empty();
+  if (sight_ == nullptr) {
+    if (!has_glass_shapes && (is_cell.empty() || std::ranges::none_of(chunks, has_cells))) return;
+    sight_ = std::make_unique<SightTrees>();
+    const std::vector<IVec3> shaped = shapes_ == nullptr ? std::vector<IVec3>() : shapes_->index.chunks();
+    chunks = chunks_of_both(shaped, grid.chunks(), false, grid);
+  }
+  sight_->is_cell = is_cell;
+  const auto is_glass = [&](VoxelType type) {
+    return types.is_transparent(type) && !types.is_shaped(type) && !counts_as_cell(type);
+  };
+  ChunkBits bits(std::size_t{kChunkEdge} * kChunkEdge);
+  const auto glass_in = [&](IVec3 chunk) -> OccupancyTree::GlassOfChunk {
+    if (shapes_ == nullptr) return {};
+    std::uint64_t any = 0;
+    for (int i = 0; has_glass_shapes && i < kChunkEdge * kChunkEdge; ++i) {
+      const IVec3 first = chunk * kChunkEdge + IVec3(0, i % kChunkEdge, i / kChunkEdge);
+      any |= bits[static_cast<std::size_t>(i)] = glass_row(*shapes_, first);
+    }
+    return {shapes_->index.cubes_in(chunk), any == 0 ? std::span<const std::uint64_t>() : bits};
+  };
+  sight_->glass.update(grid, types, chunks, is_glass, glass_in);
+  if (sight_->is_cell.empty()) return;
+  ChunkBits opaque(bits.size());
+  const auto cells_in = [&](IVec3 at) -> OccupancyTree::GlassOfChunk {
+    if (!has_cells(at)) return {};
+    const Chunk& chunk = *grid.find_chunk(at);
+    std::ranges::fill(bits, 0);
+    std::ranges::fill(opaque, 0);
+    add_rows(trace::ChunkRows(chunk, types, Occupancy::Opaque), opaque);
+    for (const VoxelType type : chunk.types()) {
+      if (counts_as_cell(type)) add_visible_cells(chunk, type, opaque, bits);
+    }
+    return {{}, bits};
+  };
+  sight_->cells.update(
+      grid, types, chunks, [](VoxelType) { return false; }, cells_in);
 }
 
 // Replaces chunks of the tree of transparent cubes, which has shapes that are cubes.
@@ -339,7 +446,8 @@ void CoarseLevel::put_in(PlacedGrid& placed) const {
   const double cell = std::ldexp(1.0, level);
   placed.voxels = voxels;
   placed.opaque = &trees.opaque();
-  placed.transparent = trees.transparent();
+  placed.transparent = placed.glass_voxels = trees.transparent();
+  placed.face_cells = nullptr;
   placed.shapes = nullptr;
   placed.field = trees.field();
   placed.opaque_field = trees.opaque_field();

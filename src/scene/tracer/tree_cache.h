@@ -68,11 +68,9 @@ struct TracedShapes {
   /// first of both at once.
   OccupancyTree solid;
   /// The voxels that shapes with glass touch: without textures or with translucent ones, of transparent types. Empty if
-  /// there are none.
+  /// there are none, or if they are in SightTrees::glass.
   OccupancyTree glass;
   std::vector<std::uint8_t> is_glass;  ///< [type]: 1 if its shapes have glass; types beyond it have none
-
-  [[nodiscard]] bool has_glass() const { return !glass.bounds().empty(); }
 };
 
 /// Returns how many voxels the shapes of any type reach outside their own: 0 or 1, not less than the true number. Cost:
@@ -83,10 +81,24 @@ struct TracedShapes {
 /// decide which parts of shapes are visible and which are glass.
 [[nodiscard]] bool has_other_shapes(const TypeChanges& changes, const VoxelRegistry& types);
 
+/// The transparent voxels of a grid for the rays of images, in two trees: most rays meet one kind of content only.
+struct SightTrees {
+  /// The voxels in which rays meet glass: transparent cubes, except cells of faces, and voxels that shapes with glass
+  /// touch. Blocks of one type contain no touched voxels.
+  OccupancyTree glass{Occupancy::Glass};
+  /// Cells of faces (CellContent::Faces), except those whose six neighbours hide all of their sides.
+  OccupancyTree cells{Occupancy::Glass};
+  std::vector<std::uint8_t> is_cell;  ///< [type]: 1 if its voxels are cells of faces; types beyond it have none
+};
+
+/// Returns true if the voxels of a type are cells of faces (CellContent::Faces) for some rays.
+[[nodiscard]] bool is_cell_of_faces(const VoxelRegistry& types, VoxelType type);
+
 /// The treatment of voxels whose type has shapes.
 enum class ShapedVoxels : std::uint8_t {
-  AsCubes,  ///< transparent cubes of their type's colour
-  ByShape,  ///< not in the trees of opaque and transparent voxels, but in `shapes`, except for ShapeIndex::cubes_in
+  AsCubes,   ///< transparent cubes of their type's colour
+  ByShape,   ///< not in the trees of opaque and transparent voxels, but in `shapes`, except for ShapeIndex::cubes_in
+  ForSight,  ///< as ByShape, and also `sight`, for images by the CPU
 };
 
 /// The tracing data of one grid for rendering, and its read position in the grid's changes.
@@ -118,22 +130,33 @@ class TreeCache {
   [[nodiscard]] const OccupancyTree* transparent() const { return transparent_ ? &*transparent_ : nullptr; }
   /// Returns null if the grid has no shapes, or ShapedVoxels::AsCubes. Lifetime: until the next update.
   [[nodiscard]] const TracedShapes* shapes() const { return shapes_.get(); }
+  /// Returns the trees in which rays find glass and cells of faces; null if there are none. Requires:
+  /// ShapedVoxels::ForSight. Lifetime: until the next update.
+  [[nodiscard]] const OccupancyTree* glass_voxels() const {
+    return sight_ == nullptr ? transparent() : if_any(sight_->glass);
+  }
+  [[nodiscard]] const OccupancyTree* face_cells() const { return sight_ == nullptr ? nullptr : if_any(sight_->cells); }
+  /// Returns true if the trees have a type as the wrong kind of transparent voxels, since its textures have changed.
+  [[nodiscard]] bool has_other_cells(const VoxelRegistry& types, VoxelType type) const;
   /// Returns all solid of the field; null if there is none.
   [[nodiscard]] const DensityTree* field() const { return field_ ? if_any(*field_) : nullptr; }
   /// Returns the opaque part of the field, or the whole field if all is opaque; null if there is none.
   [[nodiscard]] const DensityTree* opaque_field() const { return split_ ? if_any(split_->opaque()) : field(); }
   /// Returns the transparent part of the field; null if there is none.
   [[nodiscard]] const DensityGlass* glass() const { return split_ ? &split_->glass() : nullptr; }
-  /// Returns true if there are transparent voxels, shapes or field parts.
+  /// Returns true if there are transparent voxels or field parts, and, with ShapedVoxels::ForSight, shapes.
   [[nodiscard]] bool has_transparent() const {
-    return transparent_.has_value() || split_ != nullptr || (shapes_ != nullptr && shapes_->has_glass());
+    return transparent_.has_value() || split_ != nullptr || glass_voxels() != nullptr;
   }
 
  private:
   static const DensityTree* if_any(const DensityTree& tree) { return tree.cells().bounds().empty() ? nullptr : &tree; }
+  static const OccupancyTree* if_any(const OccupancyTree& tree) { return tree.bounds().empty() ? nullptr : &tree; }
   void update_transparent(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes);
   void update_glass_cubes(const Grid& grid, const VoxelRegistry& types, const std::vector<IVec3>& chunks);
-  bool update_shapes(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes);
+  std::optional<std::vector<IVec3>> update_shapes(const Grid& grid, const VoxelRegistry& types,
+                                                  const GridChanges& changes);
+  void update_sight(const Grid& grid, const VoxelRegistry& types, std::vector<IVec3> chunks);
   void update_split(const DensityGrid& field, const VoxelRegistry& types, const DensityChanges& changes);
 
   ShapedVoxels shaped_ = ShapedVoxels::AsCubes;
@@ -142,6 +165,7 @@ class TreeCache {
   std::optional<OccupancyTree> transparent_;
   ChangeCursor followed_data_;  // unused without shapes
   std::unique_ptr<TracedShapes> shapes_;
+  std::unique_ptr<SightTrees> sight_;  // null if rays meet no other transparent voxels than those of `transparent_`
   ChangeCursor followed_field_;
   std::optional<DensityTree> field_;
   std::unique_ptr<SplitField> split_;  // null if the field has no transparent part
