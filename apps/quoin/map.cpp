@@ -126,9 +126,8 @@ void add_map_command(CLI::App& app, int& status) {
       [options](const MapTiles& tiles) { options->map.tiles = tiles; },
       "Format of the tiles: webp or png (default webp)");
   command
-      ->add_option(
-          "--ceiling", options->map.ceiling,
-          "Cut the world at this height, to see below a roof (default: 100 in Minecraft's nether, else none)")
+      ->add_option("--ceiling", options->map.ceiling,
+                   "Cut the world at this height, to see below a roof (default: 100 in Minecraft's nether, else none)")
       ->type_name("Y");
   set_heading(*command, heading::kInput);
   add_dimension_option(*command, options->load);

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Repeats the finished chunks of a Minecraft region in a world of any number of regions, to measure maps of large worlds.
+"""Repeats the finished chunks of a Minecraft region in a world of many regions, to measure maps of large worlds.
 
     repeat_region.py REGION.mca WORLD [REGIONS]
 

@@ -101,7 +101,7 @@ struct VoxelProperties {
   /// Radiance emitted, as a multiple of the colour in linear light; 0 is none. Each face has a share of it
   /// (VoxelFace::emission_share), by default all. Propagated light goes by the type alone, as in block games.
   float emission = 0.0F;
-  float ior = 1.5F;        ///< index of refraction, used by transparent types
+  float ior = 1.5F;  ///< index of refraction, used by transparent types
   /// Mean number of scattering events per voxel length in path tracing, for transparent media such as clouds. `colour`
   /// is then the albedo: the fraction of light that each event keeps. 0: glass.
   float scattering = 0.0F;

@@ -111,8 +111,8 @@ class ChunkSource {
   [[nodiscard]] Result<std::optional<Chunk>> read(IVec3 chunk, std::vector<Error>* broken = nullptr) const;
 
   /// Calls `visit` for the voxels of a part up to the height `top`, except air, in each column from the top down, until
-  /// it returns false for a voxel of that column. Different columns can take turns. Maps take much less time in this way
-  /// than by `read_part`: if the format allows it, the voxels below are not even decoded.
+  /// it returns false for a voxel of that column. Different columns can take turns. Maps take much less time in this
+  /// way than by `read_part`: if the format allows it, the voxels below are not even decoded.
   ///
   /// `visit`: receives the voxel in the source's grid and its type, of `types()`.
   /// Errors:  as read_part. Requires: part < parts().size().

@@ -39,8 +39,8 @@ struct DrawnMap {
   std::vector<std::string> warnings{};
 };
 
-/// Opens a world to draw: of Minecraft or Luanti, as open_chunk_source; the grid with the most chunks of a .quoin world;
-/// or the scene of any other file with voxels, which is loaded whole (load_scene).
+/// Opens a world to draw: of Minecraft or Luanti, as open_chunk_source; the largest grid of a .quoin world; or the scene
+/// of any other file with voxels, which is loaded whole (load_scene).
 ///
 /// Errors: those of open_chunk_source, WorldStore and load_scene; Unsupported for scenes with density fields, voxels of
 ///         different sizes, or rotations other than by multiples of 90 degrees.

@@ -208,8 +208,8 @@ class MinecraftSource final : public ChunkSource {
   }
 
  private:
-  /// Reads one of the game's chunks: `use(root, place, report)`, with its position in chunks of the game. Reports broken
-  /// data. Errors: those of `use`, except BadFormat, which is broken data too.
+  /// Reads one of the game's chunks: `use(root, place, report)`, with its position in chunks of the game. Reports
+  /// broken data. Errors: those of `use`, except BadFormat, which is broken data too.
   template <class Use>
   Status read_chunk(const RegionFile& file, RegionName name, IVec3 chunk, std::vector<Error>& broken, Use use) const {
     const IVec3 place{name.x * kRegionEdge + chunk.x, 0, name.z * kRegionEdge + chunk.z};
