@@ -29,7 +29,7 @@ endfunction()
 
 # Embeds the tables of Quoin's own block pack (src/io/packs/data). `root`: the top of the repository.
 function(quoin_embed_block_pack target root)
-  set(tables families rules textures node_families node_rules node_tiles)
+  set(tables families rules textures emission node_families node_rules node_tiles)
   list(TRANSFORM tables REPLACE "(.+)" "${root}/src/io/packs/data/\\1.json")
   quoin_embed(${target} block_pack FILES ${tables}
     USERS "${root}/src/io/packs/pack_own.cpp" "${root}/src/io/packs/node_pack.cpp")

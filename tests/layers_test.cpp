@@ -62,7 +62,7 @@ constexpr int kSmallFile = 60;
 constexpr int kMaxLines = 900;
 // Numbers of C++ files without tests in src, include and apps. They only rise for a new subject, such as a format: a
 // change that merges files lowers them.
-constexpr int kMaxSources = 750;
+constexpr int kMaxSources = 752;
 constexpr int kMaxSmallSources = 83;
 
 // A folder with more files should be split.

@@ -786,7 +786,8 @@ constexpr Entry kWords[] = {
     {"air", 0, K::Air},
 };
 
-/// Returns true if a name contains a word at its start or after an underscore.
+}  // namespace
+
 bool has_word(std::string_view name, std::string_view word) {
   for (std::size_t at = name.find(word); at != std::string_view::npos; at = name.find(word, at + 1)) {
     const bool begins = at == 0 || name[at - 1] == '_' || name[at - 1] == '/';
@@ -796,6 +797,8 @@ bool has_word(std::string_view name, std::string_view word) {
   }
   return false;
 }
+
+namespace {
 
 std::optional<BlockLook> look_by_words(std::string_view name) {
   std::optional<BlockLook> look;
@@ -830,35 +833,6 @@ BlockLook look_of_nothing(std::string_view name) {
   const std::uint32_t grey = 0x60 + (hash & 0x3FU);
   const auto part = [&](unsigned shift) { return grey + (hash >> shift & 0x1FU); };
   return look_of(part(8) << 16 | part(14) << 8 | part(20), Kind::Solid);
-}
-
-// The passage of light is the value `filterLight` of the game's blocks, which minecraft-data lists
-// (https://github.com/PrismarineJS/minecraft-data, data/pc/1.21.11/blocks.json). 0: as through air. 1: sky light loses
-// a level. 15: no light passes. See also "Opacity" in the Minecraft Wiki. Stairs, slabs and the like have 0 too, but
-// stop light at faces that they fill; as whole voxels they keep it out.
-// The last words of blocks with 1, except liquids and clear blocks:
-constexpr std::string_view kFilters[] = {"leaves",         "cobweb",     "beacon",      "spawner",      "vault",
-                                         "powder_snow",    "lava",       "end_gateway", "chorus_plant", "chorus_flower",
-                                         "shulker_box",    "kelp",       "kelp_plant",  "seagrass",     "coral",
-                                         "coral_fan",      "wall_fan",   "sea_pickle",  "conduit",      "sculk_vein",
-                                         "mangrove_roots", "resin_clump"};
-// Words of blocks with 0 that look solid, since they fill their voxel here:
-constexpr std::string_view kOpen[] = {
-    "fence",  "wall",    "door",       "trapdoor",      "sign",     "shelf",  "bed",     "chest",     "skull",
-    "head",   "lantern", "cauldron",   "anvil",         "campfire", "potted", "pot",     "cake",      "cactus",
-    "bell",   "hopper",  "grindstone", "rod",           "egg",      "bud",    "cluster", "composter", "end_portal",
-    "statue", "ghast",   "core",       "moving_piston", "torch",    "bars",   "chain",   "grate"};
-constexpr std::string_view kNotOpen[] = {"piston_head", "sea_lantern", "jack_o_lantern", "end_portal_frame",
-                                         "chain_command_block"};
-
-void set_passage(std::string_view name, BlockLook& look) {
-  const auto ends = [&](std::string_view word) { return name.ends_with(word) && has_word(name, word); };
-  const auto has = [&](std::string_view word) { return has_word(name, word); };
-  const bool is_filter = std::ranges::any_of(kFilters, ends) && name != "muddy_mangrove_roots";
-  const bool is_open = std::ranges::any_of(kOpen, has) && std::ranges::find(kNotOpen, name) == std::end(kNotOpen);
-  if (is_filter) look.light_cost = 1;
-  if (name == "tinted_glass") look.light_cost = kMaxLightCost;
-  if (look.colour.a == 255 && (is_filter || is_open)) look.blocks_light = false;
 }
 
 bool is_lamp(std::string_view name) {

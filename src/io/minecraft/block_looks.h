@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <quoin/grid/voxel_registry.h>
@@ -95,6 +97,18 @@ struct BlockLook {
   Tint tint = Tint::None;
   Knowledge knowledge = Knowledge::Table;
 };
+
+/// Returns true if a name contains a word at its start or after an underscore.
+[[nodiscard]] bool has_word(std::string_view name, std::string_view word);
+
+/// Sets the passage of light of a block (VoxelProperties::light_cost, blocks_light). `name`: without a namespace.
+void set_passage(std::string_view name, BlockLook& look);
+
+/// Returns the light level that a block emits in the game, 0 to 15; nullopt for blocks that are not listed. `name`:
+/// with or without the namespace "minecraft". Without the property that lights it up, a block is dark, except redstone
+/// torches.
+[[nodiscard]] std::optional<int> light_level_of_block(std::string_view name,
+                                                      std::span<const std::pair<std::string, std::string>> properties);
 
 /// Returns the look of a block. `name`: "minecraft:oak_stairs", or without its namespace; also of mods. `is_lit`,
 /// `is_snowy`: the states of these names are "true". Cost: some look-ups in sorted tables.

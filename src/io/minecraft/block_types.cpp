@@ -257,12 +257,15 @@ Result<Block> BlockTypes::block(std::string_view name, const std::vector<Propert
     if (const auto known = blocks_.find(key); known != blocks_.end()) return known->second;
   }
   const std::uint8_t light = is_light_block(name) ? level_of(properties) : std::uint8_t{0};
-  return add(key, block_state(name, properties), light);
+  return add(key, block_state(name, properties), light, light_level_of_block(name, properties));
 }
 
-Result<Block> BlockTypes::add(const std::string& key, const BlockState& state, std::uint8_t light) {
+Result<Block> BlockTypes::add(const std::string& key, const BlockState& state, std::uint8_t light,
+                              std::optional<int> emitted) {
   const std::string_view name = std::string_view(state.name).substr(0, state.name.find('['));
-  const BlockLook look = look_of_block(name, state.is_lit, state.is_snowy);
+  BlockLook look = look_of_block(name, state.is_lit, state.is_snowy);
+  // Propagated light of this emission has the block's level.
+  if (emitted) look.emission = static_cast<float>(*emitted) / 15.0F;
   Block block;
   block.state = state.state;
   const std::unique_lock lock(mutex_);

@@ -105,7 +105,8 @@ class BlockTypes {
   [[nodiscard]] std::string invisible_name(std::uint16_t number) const;
 
  private:
-  [[nodiscard]] Result<Block> add(const std::string& key, const BlockState& state, std::uint8_t light);
+  [[nodiscard]] Result<Block> add(const std::string& key, const BlockState& state, std::uint8_t light,
+                                  std::optional<int> emitted);
   mutable std::shared_mutex mutex_;
   VoxelRegistry types_;
   std::unordered_map<std::string, Block> blocks_;

@@ -100,6 +100,51 @@ TEST(BlockLooks, PassLightAsTheGame) {
   }
 }
 
+TEST(BlockLooks, HaveTheLightLevelsOfTheGame) {
+  using minecraft::light_level_of_block;
+  using Properties = std::vector<minecraft::Property>;
+  const auto level = [](std::string_view name, const Properties& properties = {}) {
+    return light_level_of_block(name, properties).value_or(-1);
+  };
+  EXPECT_EQ(level("torch"), 14);
+  EXPECT_EQ(level("minecraft:lantern"), 15);
+  EXPECT_EQ(level("soul_fire"), 10);
+  EXPECT_EQ(level("magma_block"), 3);
+  EXPECT_EQ(level("furnace", {{"facing", "east"}, {"lit", "true"}}), 13);
+  EXPECT_EQ(level("furnace", {{"lit", "false"}}), 0);
+  EXPECT_EQ(level("furnace"), 0);
+  EXPECT_EQ(level("redstone_torch"), 7);
+  EXPECT_EQ(level("redstone_torch", {{"lit", "false"}}), 0);
+  for (int count = 1; count <= 4; ++count) {
+    EXPECT_EQ(level("lime_candle", {{"candles", std::to_string(count)}, {"lit", "true"}}), 3 * count);
+    EXPECT_EQ(level("sea_pickle", {{"pickles", std::to_string(count)}, {"waterlogged", "true"}}), 3 + 3 * count);
+    constexpr std::array kCharges{0, 3, 7, 11, 15};
+    EXPECT_EQ(level("respawn_anchor", {{"charges", std::to_string(count)}}), kCharges[static_cast<std::size_t>(count)]);
+  }
+  EXPECT_EQ(level("candle", {{"candles", "9"}, {"lit", "true"}}), 3) << "an unknown number";
+  EXPECT_EQ(level("candle", {{"candles", "4"}, {"lit", "false"}}), 0);
+  EXPECT_EQ(level("sea_pickle", {{"pickles", "4"}, {"waterlogged", "false"}}), 0);
+  EXPECT_EQ(level("waxed_weathered_copper_bulb", {{"lit", "true"}}), 8);
+  EXPECT_EQ(level("cave_vines_plant", {{"berries", "true"}}), 14);
+  EXPECT_EQ(level("cave_vines_plant", {{"berries", "false"}}), 0);
+  for (const char* name : {"stone", "mod:torch", "glow_berries_of_a_mod", ""}) EXPECT_EQ(level(name), -1) << name;
+}
+
+TEST(BlockLooks, EmitTheirLevelsAsPropagatedLight) {
+  minecraft::BlockTypes blocks;
+  const auto emission_of = [&](const char* name, const std::vector<minecraft::Property>& properties) {
+    const auto block = blocks.block(name, properties);
+    return blocks.types()[block.value().type].emission;
+  };
+  EXPECT_FLOAT_EQ(emission_of("minecraft:torch", {}), 14.0F / 15.0F);
+  EXPECT_FLOAT_EQ(emission_of("minecraft:candle", {{"candles", "2"}, {"lit", "true"}}), 6.0F / 15.0F);
+  EXPECT_FLOAT_EQ(emission_of("minecraft:candle", {{"candles", "3"}, {"lit", "true"}}), 9.0F / 15.0F);
+  EXPECT_EQ(emission_of("minecraft:candle", {{"candles", "3"}, {"lit", "false"}}), 0.0F);
+  EXPECT_EQ(emission_of("minecraft:glowstone", {}), 1.0F);
+  EXPECT_EQ(emission_of("mod:glow_stone", {}), 1.0F) << "names that are not listed keep the rule of their words";
+  EXPECT_EQ(emission_of("minecraft:stone", {}), 0.0F);
+}
+
 TEST(LegacyBlocks, MapsNumbersToModernNames) {
   EXPECT_EQ(minecraft::legacy_block(1, 3).first, "minecraft:diorite");
   EXPECT_EQ(minecraft::legacy_block(35, 14).first, "minecraft:red_wool");

@@ -133,6 +133,13 @@ Result<PackElement> element_of(const Json& json) {
     if (!turn) return turn.error();
     element.turn = *turn;
   }
+  if (const auto light = json.find("light_emission"); light != json.end()) {
+    const double level = light->is_number() ? light->get<double>() : -1.0;
+    if (!(level >= 0.0 && level <= 15.0) || std::floor(level) != level) {
+      return wrong_model("\"light_emission\" is not a whole number from 0 to 15");
+    }
+    element.light_emission = static_cast<int>(level);
+  }
   constexpr std::array<const char*, 6> kNames = {"east", "west", "up", "down", "south", "north"};
   const auto faces = json.find("faces");
   if (faces == json.end() || !faces->is_object()) return element;

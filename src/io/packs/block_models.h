@@ -40,6 +40,7 @@ struct PackFace {
   std::optional<std::array<float, 4>> uv{};  ///< left, top, right, bottom, in sixteenths; nullopt: by the box
   int turn = 0;                              ///< clockwise quarter turns of the texture, 0 to 3
   bool is_tinted = false;
+  std::uint8_t emission_share = 255;  ///< VoxelFace::emission_share
 };
 
 /// A box of a model, in the published axes, which are those of grids: east is +X, up +Y, south +Z.
@@ -48,6 +49,7 @@ struct PackElement {
   Vec3 to{16.0F};
   std::optional<ElementTurn> turn{};
   std::array<std::optional<PackFace>, 6> faces{};  ///< by Direction
+  int light_emission = 0;  ///< the least light level in which the game shows the element, 0 to 15
 };
 
 /// A model with the content of its parents.

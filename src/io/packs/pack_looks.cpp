@@ -302,6 +302,11 @@ class BlockLooks::Maker {
       }
     }
     std::erase_if(outcomes_, [](const Outcome& each) { return each.model->elements().empty(); });
+    for (const Outcome& outcome : outcomes_) {
+      for (const PackElement& each : outcome.model->elements()) {
+        greatest_light_ = std::max(greatest_light_, each.light_emission);
+      }
+    }
     return {};
   }
 
@@ -404,12 +409,28 @@ class BlockLooks::Maker {
     const auto texture = [&](const BlockModel& model, const PackFace& face) { return texture_of_face(model, face); };
     const FaceColours colours{texture, {type_.colour.r, type_.colour.g, type_.colour.b}, outcome.tint};
     const AxisOrientation turn = orientation_of(outcome.state);
+    const std::vector<PackElement> lit = lit_elements(*outcome.model);
+    const std::span<const PackElement> own = lit.empty() ? outcome.model->elements() : std::span(lit);
     if (!outcome.state.keeps_uv || turn == AxisOrientation()) {
-      return elements_of(*outcome.model, outcome.model->elements(), colours, has_textures_, looks_.textures_);
+      return elements_of(*outcome.model, own, colours, has_textures_, looks_.textures_);
     }
     std::vector<PackElement> turned;
-    for (const PackElement& each : outcome.model->elements()) turned.push_back(turned_with_world(each, turn));
+    for (const PackElement& each : own) turned.push_back(turned_with_world(each, turn));
     return elements_of(*outcome.model, turned, colours, has_textures_, looks_.textures_);
+  }
+
+  /// Returns a model's elements with shares of emission; none if all faces have all of it. Packs that light up elements
+  /// decide; else the rules for the block's name do.
+  [[nodiscard]] std::vector<PackElement> lit_elements(const BlockModel& model) const {
+    if (greatest_light_ > 0) return with_light_emission(model.elements(), emission());
+    const EmittingFaces* const rule = type_.emission > 0.0F ? EmissionRules::instance().find(name_) : nullptr;
+    return rule == nullptr ? std::vector<PackElement>() : with_emission(model, *rule);
+  }
+
+  /// Returns the emission of the type with its look. Types that the game does not count as lights have the greatest
+  /// light of their elements.
+  [[nodiscard]] float emission() const {
+    return type_.emission > 0.0F ? type_.emission : static_cast<float>(greatest_light_) / 15.0F;
   }
 
   /// Returns the orientation that remains after `elements`.
@@ -664,6 +685,7 @@ class BlockLooks::Maker {
     made.visibility = is_opaque ? Visibility::Opaque : Visibility::Transparent;
     if (is_opaque) made.colour.a = 255;
     made.occludes = std::nullopt;
+    made.emission = emission();
     // Shapes stop light by their sides.
     if (is_opaque && !made.shapes.empty()) made.blocks_light = std::nullopt;
     made.attributes.erase(minecraft::kGuessAttribute);
@@ -681,6 +703,7 @@ class BlockLooks::Maker {
   bool is_multipart_ = false;
   bool has_textures_ = false;
   std::vector<Outcome> outcomes_;
+  int greatest_light_ = 0;  // PackElement::light_emission of all models
 };
 
 namespace {

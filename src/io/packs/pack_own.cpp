@@ -18,6 +18,7 @@
 #include "io/minecraft/block_looks.h"
 #include "io/packs/block_models.h"
 #include "io/packs/block_states.h"
+#include "io/packs/pack_shapes.h"
 #include "io/packs/patterns/pack_patterns.h"
 #include "io/zip.h"
 
@@ -35,6 +36,10 @@ constexpr char kRuleTable[] =
     ;
 constexpr char kTextureTable[] =
 #include "block_pack_textures.json.inc"
+    ;
+
+constexpr char kEmissionTable[] =
+#include "block_pack_emission.json.inc"
     ;
 
 std::optional<std::uint32_t> parse_colour(std::string_view text) {
@@ -194,6 +199,15 @@ std::optional<AlphaImage> TextureRecipes::draw(const ResourceName& texture) cons
     std::ranges::copy(bytes, made.rgba.begin() + static_cast<std::ptrdiff_t>(i * 4));
   }
   return made;
+}
+
+const EmissionRules& EmissionRules::instance() {
+  static const EmissionRules rules = [] {
+    auto made = EmissionRules::from_text(kEmissionTable);
+    QUOIN_ASSERT(made, "a valid table in the library");
+    return std::move(*made);
+  }();
+  return rules;
 }
 
 const std::shared_ptr<const OwnPack>& OwnPack::instance() {
