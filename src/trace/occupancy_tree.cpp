@@ -443,29 +443,19 @@ struct OccupancyTree::Impl {
     }
     return changed;
   }
-  // As above, also with the listed voxels of types with shapes (OccupancyTree::CubesOfChunk).
-  std::uint64_t put(const Chunk* voxels, const VoxelRegistry& types, IVec3 chunk,
-                    std::span<const std::uint64_t> cubes) {
-    if (voxels == nullptr || cubes.empty()) return put(voxels, types, chunk);
-    const trace::ChunkRows rows(*voxels, types, which);
-    using Rows = trace::ListedChunkRows;
-    const std::uint64_t changed = put(Rows(rows, cubes, Rows::Join::Either), chunk);
-    set_uniform_blocks(
-        chunk, [&](trace::UniformBlocks& blocks) { trace::find_uniform_blocks(*voxels, types, cubes, blocks); });
-    return changed;
-  }
-  // As above, also with voxels that shapes touch (OccupancyTree::GlassOfChunk).
+  // As above, with the types that `counts` accepts, and with listed voxels.
   std::uint64_t put(const Chunk* voxels, const VoxelRegistry& types, IVec3 chunk,
                     const FunctionRef<bool(VoxelType)>& counts, const GlassOfChunk& glass) {
     static const Chunk air;
     const trace::ChunkRows rows(voxels == nullptr ? air : *voxels, counts);
     if (rows.none() && glass.cubes.empty() && glass.touched.empty()) return drop(chunk);
-    BlockVector<std::uint64_t> listed(std::size_t{kChunkEdge} * kChunkEdge);
+    BlockVector<std::uint64_t> listed(std::max(glass.cubes.size(), glass.touched.size()));
     for (const std::span<const std::uint64_t> each : {glass.cubes, glass.touched}) {
       for (std::size_t i = 0; i < each.size(); ++i) listed[i] |= each[i];
     }
     using Rows = trace::ListedChunkRows;
-    const std::uint64_t changed = put(Rows(rows, listed, Rows::Join::Either), chunk);
+    const std::uint64_t changed =
+        listed.empty() ? put(rows, chunk) : put(Rows(rows, listed, Rows::Join::Either), chunk);
     set_uniform_blocks(chunk, [&](trace::UniformBlocks& blocks) {
       blocks = {};
       if (voxels == nullptr || (rows.none() && glass.cubes.empty())) return;
@@ -837,13 +827,8 @@ void OccupancyTree::update(const DensityGrid& field, const VoxelRegistry& types,
 
 void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, std::span<const IVec3> chunks,
                            const CubesOfChunk& cubes_in) {
-  QUOIN_ASSERT(impl_ != nullptr && impl_->which == Occupancy::Glass, "a tree of glass that was not moved from");
-  std::vector<ChunkBricks> changed;
-  changed.reserve(chunks.size());
-  for (const IVec3 chunk : chunks) {
-    changed.push_back({chunk, impl_->put(grid.find_chunk(chunk), types, chunk, cubes_in(chunk))});
-  }
-  finish_update(changed);
+  const auto is_glass = [&](VoxelType type) { return types.is_transparent(type) && !types.is_shaped(type); };
+  update(grid, types, chunks, is_glass, [&](IVec3 chunk) { return GlassOfChunk{cubes_in(chunk), {}}; });
 }
 
 void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, std::span<const IVec3> chunks,

@@ -269,7 +269,7 @@ Tile::Sight Tile::add_transparent(const Ray& ray, int lane, double max_t, std::s
     }
     last = &body;
     if (as_solid && body.starts_inside) continue;
-    if (is_unseen(sight.passed)) break;
+    if (!as_solid && is_unseen(sight.passed)) break;
     std::optional<Surface> textured;
     const GlassLook look = as_solid ? GlassLook{Vec3(0.0F), 1.0F} : look_of(surface_of(surfaces, body, textured), body);
     fill_in(ray, body, normal, add_point(pixel, sight.passed * look.own));
@@ -280,7 +280,7 @@ Tile::Sight Tile::add_transparent(const Ray& ray, int lane, double max_t, std::s
     if (!lies_on_opaque(*context_->view, ray, *last, seen_.end)) leave_body(ray, *last, sight);
   }
   add_faces(std::numeric_limits<double>::infinity());
-  sight.is_closed |= is_unseen(sight.passed);
+  sight.is_closed |= !as_solid && is_unseen(sight.passed);
   return sight;
 }
 

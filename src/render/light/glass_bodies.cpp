@@ -61,7 +61,7 @@ class BodiesOfGrid {
     QUOIN_ASSERT(placed_.voxel_size > 0.0, "a positive voxel size");
   }
 
-  // Finds the faces of cells. If one ends the ray, whatever is added later ends there. `first`: the first cell, if it
+  // Finds the faces of cells. If one ends the ray, glass that is added later ends there. `first`: the first cell, if it
   // is known, as for `add_glass`.
   void add_faces(const RayHit* first) {
     GridReader voxels_of(*placed_.voxels);

@@ -164,7 +164,7 @@ std::uint32_t first_solids(const TracedShapes& shapes, const Grid& voxels, const
 /// the voxel where a ray starts if it misses the shapes there, as above the surface of water.
 void first_glass(const TracedShapes& shapes, const OccupancyTree& glass_voxels, const RayPacket& rays_in_grid,
                  PacketHits& hits);
-/// What most rays of a packet are expected to do. Changes their cost, not their results.
+/// The expected result of most rays of a packet. Changes their cost, not their results.
 enum class MostRays : std::uint8_t {
   Miss,  ///< as rays of occlusion
   Hit,   ///< opaque voxels, as rays to lamps behind walls

@@ -213,7 +213,8 @@ bool TreeCache::update(const Grid& grid, const VoxelRegistry& types) {
     if (!with_other_shapes) update_transparent(grid, types, *changes);
   }
   if (changes->all) sight_.reset();
-  if (shaped_ == ShapedVoxels::ForSight) {
+  const bool may_differ = sight_ != nullptr || shapes_ != nullptr || types.has_textures();
+  if (shaped_ == ShapedVoxels::ForSight && may_differ) {
     // If this fails, the trees differ: the next update makes all again.
     const ChangeCursor followed = std::exchange(followed_, {});
     update_sight(grid, types, with_other_shapes ? *with_other_shapes : changes->chunks(grid));
