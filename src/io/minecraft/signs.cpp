@@ -14,7 +14,7 @@ namespace quoin::minecraft {
 
 namespace {
 
-constexpr int kMaxDepth = 32;
+constexpr int kMaxTextDepth = 32;
 constexpr std::size_t kMaxLineBytes = 4'096;  // a line of the game has some 100
 
 // Text components: a string, a list of components, or an object with "text" and more components in "extra". Translated
@@ -34,9 +34,9 @@ void add_text(const nlohmann::json& component, std::string& text) {
 void add_text(nbt::Value component, int depth, std::string& text) {
   if (const auto own = component.text()) {
     text += *own;
-  } else if (depth < kMaxDepth && component.tag() == nbt::Tag::List) {
+  } else if (depth < kMaxTextDepth && component.tag() == nbt::Tag::List) {
     component.for_each([&](nbt::Value each) { add_text(each, depth + 1, text); });
-  } else if (depth < kMaxDepth && component.tag() == nbt::Tag::Compound) {
+  } else if (depth < kMaxTextDepth && component.tag() == nbt::Tag::Compound) {
     // A component without other properties in a list of compounds has an empty name.
     add_text(component[component["text"] ? "text" : ""], depth + 1, text);
     add_text(component["extra"], depth + 1, text);
@@ -45,7 +45,7 @@ void add_text(nbt::Value component, int depth, std::string& text) {
 
 std::string text_of_json(std::string_view text) {
   const bool is_component = text.starts_with('{') || text.starts_with('"') || text.starts_with('[');
-  if (!is_component || json_extent(text).depth > kMaxDepth) return std::string(text == "null" ? "" : text);
+  if (!is_component || json_extent(text).depth > kMaxTextDepth) return std::string(text == "null" ? "" : text);
   const auto json = nlohmann::json::parse(text, nullptr, false);
   if (json.is_discarded()) return std::string(text);
   std::string found;
