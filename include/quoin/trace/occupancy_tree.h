@@ -97,9 +97,9 @@ class OccupancyTree {
   using CubesOfChunk = FunctionRef<std::span<const std::uint64_t>(IVec3 chunk)>;
   [[gnu::visibility("hidden")]] void update(const Grid& grid, const VoxelRegistry& types, std::span<const IVec3> chunks,
                                             const CubesOfChunk& cubes_in);
-  // As above, of a tree of the voxels in which rays meet glass: cubes of the types that `counts` accepts, the `cubes`
-  // of shaped types, and the voxels that shapes with glass `touch`. Blocks of one type contain no touched voxels. Both
-  // are rows along x by y + 64 z; no rows: none.
+  // As above, of a tree of the voxels in which rays meet glass: cubes of the types that `counts` accepts, cubes of
+  // shaped types (`cubes`), and the voxels that shapes with glass `touch`. Blocks of one type contain no touched
+  // voxels. Both are rows along x by y + 64 z; no rows: none.
   struct GlassOfChunk {
     std::span<const std::uint64_t> cubes;
     std::span<const std::uint64_t> touched;

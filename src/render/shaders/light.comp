@@ -332,6 +332,12 @@ vec3 normal_met(int instance, uint face, float t) {
   return face_normal(placed_at(instance), face);
 }
 
+// Returns true if too little light passes to be seen: kUnseen of cpu/cpu_renderer.cpp.
+bool is_unseen(vec3 passed) {
+  bool shows_values = has(kShowOcclusion) || has(kShowNormals);
+  return !shows_values && max(max(passed.x, passed.y), passed.z) < 1.6e-5;
+}
+
 // Lights this round's points of a pixel; returns true if that completes it. One loop over all points;
 // direct_light.glsl gives the reason.
 bool light_pixel(uint slot, inout State state) {
@@ -344,6 +350,7 @@ bool light_pixel(uint slot, inout State state) {
   for (;;) {
     bool is_body = kHasGlass && enter_next(way, opaque_t, state);
     if (kHasGlass && !is_body && !way.is_last) return false;
+    if (kHasGlass && is_unseen(state.weight.xyz) && !(is_body && is_face(way.met))) return true;
     Point point = opaque;
     vec3 weight = state.weight.xyz;
     if (is_body) {

@@ -93,8 +93,8 @@ class SceneView {
   /// As above, for rays in the space of grid `home`, without cells of faces.
   void find_glass(std::int32_t home, const RayPacket& rays_in_grid, ThroughHits& hits) const;
   /// Calls `visit` for each instance whose cells of faces some of the rays may hit, beginning with grid `home`, in
-  /// whose space the rays are. Passes an index into SceneTracer::placed, the rays in its space, and the first cells
-  /// that they hit; `visit` returns the rays that end there, which other instances need not look at. Returns all these
+  /// whose space the rays are. Passes an index into SceneTracer::placed, the rays in its space, and their first hits
+  /// on cells; `visit` returns the rays that end there, which other instances need not look at. Returns all these
   /// rays.
   std::uint32_t visit_face_cells(
       std::int32_t home, const RayPacket& rays_in_grid,
