@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -62,6 +63,11 @@ Result<DrawnMap> draw(const MapCommand& command) {
     load.dimension = left[i];
     if (packs != nullptr) load.packs.clear();  // the source gets them below
     auto source = open_map_source(command.world, load, command.map.threads, bar.listener("reading"));
+    if (!source && i > 0 && !was_interrupted()) {
+      // The others are drawn: the game may just be writing the first region of this one.
+      all.warnings.push_back(left[i] + " is left out: " + to_string(source.error()));
+      continue;
+    }
     if (!source) return source.error();
     const std::string dimension = (*source)->info().dimension;
     // Without a choice, the first one that opens is followed by the others.
@@ -98,7 +104,9 @@ int run(const MapCommand& command) {
                        {"warnings", drawn->warnings}});
   }
   print_warnings(drawn->warnings);
-  const auto page = command.folder / "index.html";
+  std::error_code error;
+  const auto index = command.folder / "index.html";
+  const auto& page = std::filesystem::exists(index, error) ? index : command.folder;
   std::string text = "Wrote " + with_thousands(static_cast<std::int64_t>(drawn->tiles_written)) + " tiles, " +
                      bytes_for_people(drawn->bytes) + "; kept " +
                      with_thousands(static_cast<std::int64_t>(drawn->tiles_kept));
@@ -113,7 +121,9 @@ int run(const MapCommand& command) {
 void add_map_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand("map", "Draw or update a map of a world for the browser");
   auto options = std::make_shared<MapCommand>();
-  command->add_option("WORLD", options->world, "World to draw: a folder or file of Minecraft or Luanti")
+  command
+      ->add_option("WORLD", options->world,
+                   "World to draw: a folder of Minecraft or Luanti, a .quoin world, or any other file with voxels")
       ->required()
       ->check(file_name());
   command->add_option("OUT", options->folder, "Folder of the map: a new one, or one to bring up to date")
@@ -128,7 +138,8 @@ void add_map_command(CLI::App& app, int& status) {
   command
       ->add_option("--ceiling", options->map.ceiling,
                    "Cut the world at this height, to see below a roof (default: 100 in Minecraft's nether, else none)")
-      ->type_name("Y");
+      ->type_name("Y")
+      ->check(CLI::Range(-1'000'000, 1'000'000));
   set_heading(*command, heading::kInput);
   add_dimension_option(*command, options->load);
   add_pack_option(*command, options->load, PlainBlocks::OwnPack);

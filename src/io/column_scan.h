@@ -28,7 +28,8 @@ class ColumnScan {
     const IVec3 corner = chunk * kChunkEdge;
     const IBox bounds = voxels.bounds();
     std::array<VoxelType, kChunkEdge> row{};
-    for (int y = std::min(bounds.max.y - 1, top_ - corner.y); y >= bounds.min.y; --y) {
+    const auto top = std::min<std::int64_t>(bounds.max.y - 1, std::int64_t{top_} - corner.y);
+    for (auto y = static_cast<int>(std::max<std::int64_t>(top, -1)); y >= bounds.min.y; --y) {
       for (int z = bounds.min.z; z < bounds.max.z; ++z) {
         std::uint64_t& columns = open_[static_cast<std::size_t>(z)];
         if (columns == 0) continue;

@@ -306,7 +306,30 @@ TEST(Signs, ShowTextOfBadComponentsAsStored) {
   const auto signs = signs_of(nbt);
   ASSERT_EQ(signs.size(), 2U);
   EXPECT_EQ(signs[0].text, "{\"text\":\nred\xEF\xBF\xBD");
-  EXPECT_EQ(signs[1].text.size(), 3'001U);
+  EXPECT_EQ(signs[1].text.size(), 1'024U);
+}
+
+// A sign of a hostile world: many long parts of formatting codes, and lines without end.
+TEST(Signs, AreShortHoweverLargeTheyAre) {
+  NbtWriter nbt;
+  nbt.compound("").list("block_entities", 10, 3);
+  std::string codes;
+  for (int i = 0; i < 20'000; ++i)
+    codes +=
+        "\xC2\xA7"
+        "4";
+  sign_at(nbt, "sign:sign", 1, 2, 3).compound("front_text").list("messages", 9, 1).number(8, 1).number(2'000, 4);
+  for (int i = 0; i < 2'000; ++i) nbt.text(codes);
+  nbt.end().end();
+  sign_at(nbt, "sign:sign", 4, 5, 6).compound("front_text").list("messages", 8, 50'000);
+  for (int i = 0; i < 50'000; ++i) nbt.text(i == 0 ? "first" : i < 4 ? "" : "beyond");
+  nbt.end().end();
+  sign_at(nbt, "sign:sign", 7, 8, 9).string("Text1", std::string(60'000, 'a')).end();
+  nbt.end();
+  const auto signs = signs_of(nbt);
+  ASSERT_EQ(signs.size(), 2U);
+  EXPECT_EQ(signs[0].text, "first");
+  EXPECT_EQ(signs[1].text.size(), 1'024U);
 }
 
 }  // namespace

@@ -42,10 +42,10 @@ bool SurfaceBuilder::add(int x, int z, int y, VoxelType type) {
   if (column.is_closed) return false;
   const bool is_first = column.voxels == 0;
   if (ceiling_ && !column.is_below_roof) {
-    const int above = is_first ? *ceiling_ + 1 : column.last_y;
+    const bool goes_on = y == (is_first ? *ceiling_ : column.last_y - 1);
     column.last_y = y;
     ++column.voxels;
-    if (y == above - 1) return column.voxels < std::numeric_limits<std::uint16_t>::max();
+    if (goes_on) return column.voxels < std::numeric_limits<std::uint16_t>::max();
     column.is_below_roof = true;
     column.voxels = 0;
   }
@@ -188,7 +188,7 @@ Result<std::shared_ptr<const ColumnSurface>> SurfaceCache::read_square(std::size
   std::vector<Error> broken;
   std::uint64_t chunks = 0;
   std::optional<Error> failure;
-  const int top = ceiling_.value_or(std::numeric_limits<int>::max() / 2);
+  const int top = ceiling_.value_or(std::numeric_limits<int>::max());
   for (const std::size_t part : squares_[number].parts) {
     auto visited = source_->visit_columns(part, top, [&](IVec3 voxel, VoxelType type) {
       return builder.add(voxel.x & (kEdge - 1), voxel.z & (kEdge - 1), voxel.y, type);

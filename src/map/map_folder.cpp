@@ -15,6 +15,7 @@
 #include <quoin/io/file.h>
 
 #include "core/bytes/text.h"
+#include "core/rows/packed_row.h"
 #include "map/map_tile.h"
 
 namespace quoin::map {
@@ -51,12 +52,22 @@ std::pair<std::string, std::string> names_of(const std::string& dimension) {
   if (dimension.empty() || dimension == kOverworld) return {"overworld", "Overworld"};
   if (dimension == kNether) return {"nether", "Nether"};
   if (dimension == kEnd) return {"end", "The End"};
+  // Never a name that leaves the folder, or that of another dimension: other bytes become a dot and their number.
   std::string key;
   for (const char c : dimension) {
-    const bool is_plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '.' || c == '-';
-    key += is_plain ? c : '-';
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-') {
+      key += c;
+    } else {
+      constexpr std::string_view kDigits = "0123456789abcdef";
+      const auto byte = static_cast<unsigned char>(c);
+      key += {'.', kDigits[byte >> 4], kDigits[byte & 15]};
+    }
   }
-  // Never a name that leaves the folder, or one of the game's own.
+  constexpr std::size_t kMaxName = 200;
+  if (key.size() > kMaxName) {
+    const std::uint64_t hash = hash_of_bytes(kHashSeed, std::as_bytes(std::span(key)));
+    key = key.substr(0, kMaxName) + "-" + std::to_string(hash);
+  }
   return {"dimension-" + key, printable(dimension)};
 }
 
@@ -96,7 +107,7 @@ Result<std::string> index_page() {
   return page;
 }
 
-Json layer_of(const ChunkSource& source, const MapLayer& layer, const MapLog& log, const std::string& folder) {
+Json layer_of(const ChunkSource& source, const MapLayer& layer, const MapLog& log) {
   int first_zoom = kMapZoom;
   constexpr int kMost = std::numeric_limits<int>::max();
   int x0 = kMost;
@@ -116,8 +127,9 @@ Json layer_of(const ChunkSource& source, const MapLayer& layer, const MapLog& lo
   Json json;
   json["key"] = layer.key;
   json["name"] = names_of(info.dimension).second;
+  json["dimension"] = info.dimension;
   json["world"] = info.name;
-  json["tiles"] = folder;
+  json["tiles"] = layer.tiles_name;
   json["extension"] = layer.extension;
   json["zooms"] = {first_zoom, kMapZoom};
   json["bounds"] = {std::int64_t{x0} * kTileEdge, std::int64_t{z0} * kTileEdge, std::int64_t{x1} * kTileEdge,
@@ -132,11 +144,8 @@ Json layer_of(const ChunkSource& source, const MapLayer& layer, const MapLog& lo
 Json markers_of(const ChunkSource& source, const MapLog& log) {
   Json markers = Json::array();
   if (const auto& spawn = source.info().spawn) {
-    markers.push_back({{"x", std::int64_t(spawn->x)},
-                       {"y", std::int64_t(spawn->y)},
-                       {"z", std::int64_t(spawn->z)},
-                       {"kind", "spawn"},
-                       {"text", "Spawn"}});
+    const IVec3 voxel = voxel_of(*spawn);
+    markers.push_back({{"x", voxel.x}, {"y", voxel.y}, {"z", voxel.z}, {"kind", "spawn"}, {"text", "Spawn"}});
   }
   for (const auto& [place, record] : log.tiles()) {
     if (record.signs.empty()) continue;
@@ -163,7 +172,8 @@ Result<MapFolder> MapFolder::open(const fs::path& folder, const ChunkSource& sou
   MapLayer& layer = opened.layer_;
   layer.key = names_of(info.dimension).first;
   layer.log = folder / "state" / (layer.key + ".log");
-  layer.tiles = layer.key == "overworld" ? folder / "tiles" : folder / "tiles" / layer.key;
+  layer.tiles_name = layer.key == "overworld" ? "tiles" : "tiles/" + layer.key;
+  layer.tiles = folder / layer.tiles_name;
   layer.extension = options.tiles == MapTiles::WebP ? "webp" : "png";
   layer.ceiling = options.ceiling;
   constexpr int kNetherCeiling = 100;
@@ -181,14 +191,14 @@ Result<MapFolder> MapFolder::open(const fs::path& folder, const ChunkSource& sou
 }
 
 Status MapFolder::write_page(const ChunkSource& source, const MapLog& log) const {
-  const std::string tiles = fs::relative(layer_.tiles, folder_).generic_string();
-  const Json layer = layer_of(source, layer_, log, tiles);
+  const Json layer = layer_of(source, layer_, log);
   const fs::path file = folder_ / "state" / (layer_.key + ".json");
   if (auto done = write_text(text_of({{"layer", layer}, {"markers", markers_of(source, log)}}) + "\n", file); !done) {
     return done;
   }
   // All layers: the overworld first, then by name.
   std::vector<std::pair<std::string, Json>> all;
+  std::vector<std::string> gone;
   std::error_code error;
   for (fs::directory_iterator entry(folder_ / "state", error), end; !error && entry != end; entry.increment(error)) {
     if (entry->path().extension() != ".json") continue;
@@ -196,9 +206,22 @@ Status MapFolder::write_page(const ChunkSource& source, const MapLog& log) const
     if (!bytes) return bytes.error();
     const Json json =
         Json::parse(std::string_view(reinterpret_cast<const char*>(bytes->data()), bytes->size()), nullptr, false);
-    if (json.is_object() && json.contains("layer") && json["layer"].is_object()) {
-      all.emplace_back(entry->path().stem().string(), json);
+    if (!json.is_object() || !json.contains("layer") || !json["layer"].is_object()) continue;
+    const std::string key = entry->path().stem().string();
+    const auto dimension = json["layer"].value("dimension", std::string());
+    const std::vector<std::string>& present = source.info().dimensions;
+    const bool is_gone = key != layer_.key && !present.empty() && !dimension.empty() &&
+                         std::ranges::find(present, dimension) == present.end() && key != "overworld";
+    if (is_gone) {
+      gone.push_back(key);
+    } else {
+      all.emplace_back(key, json);
     }
+  }
+  for (const std::string& key : gone) {
+    fs::remove_all(folder_ / "tiles" / key, error);
+    fs::remove(folder_ / "state" / (key + ".log"), error);
+    fs::remove(folder_ / "state" / (key + ".json"), error);
   }
   std::ranges::sort(all, {}, [](const auto& each) { return std::tuple(each.first != "overworld", each.first); });
   Json layers = Json::array();
@@ -213,7 +236,7 @@ Status MapFolder::write_page(const ChunkSource& source, const MapLog& log) const
     return done;
   }
   const auto page = index_page();
-  if (!page) return page.error().code == ErrorCode::Unsupported ? Status() : Status(page.error());
+  if (!page) return page.error();
   return write_text(*page, folder_ / "index.html");
 }
 
@@ -222,6 +245,9 @@ std::string text_of_signs(std::vector<SourceSign> signs) {
   std::ranges::sort(signs, {}, [](const SourceSign& sign) {
     return std::tuple(sign.voxel.z, sign.voxel.x, sign.voxel.y, sign.text);
   });
+  // A tile of a game has a few; its record in the log must stay far below MapLog's limit.
+  constexpr std::size_t kMaxSigns = 1'000;
+  if (signs.size() > kMaxSigns) signs.resize(kMaxSigns);
   Json list = Json::array();
   for (const SourceSign& sign : signs) list.push_back({sign.voxel.x, sign.voxel.y, sign.voxel.z, sign.text});
   return text_of(list);

@@ -15,8 +15,10 @@ namespace quoin::map {
 
 /// One map of a folder: a dimension. The page switches between them.
 struct MapLayer {
-  std::string key;  ///< "overworld", "nether", "NAMESPACE-NAME": names files, and the layer in the page's address
+  /// "overworld", "nether", "end", "dimension-NAMESPACE.3aNAME": names files, and the layer in the page's address.
+  std::string key;
   std::filesystem::path log;
+  std::string tiles_name;  ///< of the folder of tiles, from the map's folder
   std::filesystem::path tiles;
   std::string extension;
   std::optional<int> ceiling;
@@ -34,7 +36,8 @@ class MapFolder {
   /// Returns the world and the options that the layer's tiles depend on, on one line.
   [[nodiscard]] const std::string& identity() const { return identity_; }
   /// Writes index.html; the data of this layer, state/KEY.json; and layers.js and markers.js with those of all layers.
-  /// Errors: CannotWrite.
+  /// Removes the layers of dimensions that the world no longer has.
+  /// Errors: CannotRead, CannotWrite; Unsupported in builds without Leaflet, when all but index.html is written.
   [[nodiscard]] Status write_page(const ChunkSource& source, const MapLog& log) const;
 
  private:
@@ -43,7 +46,7 @@ class MapFolder {
   std::string identity_;
 };
 
-/// Returns signs as a JSON list of [x, y, z, "text"], sorted by place; empty if there are none.
+/// Returns signs as a JSON list of [x, y, z, "text"], sorted by place, at most 1,000; empty if there are none.
 [[nodiscard]] std::string text_of_signs(std::vector<SourceSign> signs);
 
 }  // namespace quoin::map

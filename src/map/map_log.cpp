@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -69,7 +70,8 @@ MapLog::MapLog(MapLog&& other) noexcept
       identity_(std::move(other.identity_)),
       descriptor_(std::exchange(other.descriptor_, -1)),
       tiles_(std::move(other.tiles_)),
-      records_(other.records_) {}
+      records_(other.records_),
+      size_(other.size_) {}
 
 MapLog::~MapLog() {
   if (descriptor_ >= 0) ::close(descriptor_);
@@ -81,8 +83,15 @@ Result<MapLog> MapLog::open(const std::filesystem::path& path, const std::string
   log.descriptor_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_APPEND, 0644);
   if (log.descriptor_ < 0) return cannot_write(path);
   if (::flock(log.descriptor_, LOCK_EX | LOCK_NB) != 0) {
+    if (errno != EWOULDBLOCK) return cannot_write(path);
     return make_error(ErrorCode::InvalidArgument, "another process is drawing this map", path.string());
   }
+  // A process that ended meanwhile may have replaced the file (`compact`): the lock is then of the old one.
+  struct stat locked {};
+  struct stat present {};
+  const bool is_same = ::fstat(log.descriptor_, &locked) == 0 && ::stat(path.c_str(), &present) == 0 &&
+                       locked.st_dev == present.st_dev && locked.st_ino == present.st_ino;
+  if (!is_same) return make_error(ErrorCode::InvalidArgument, "another process is drawing this map", path.string());
   auto bytes = read_file(path);
   if (!bytes) return bytes.error();
   const std::string_view text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
@@ -111,6 +120,8 @@ Result<MapLog> MapLog::open(const std::filesystem::path& path, const std::string
     if (auto done = log.append(heading(identity)); !done) return done.error();
   } else if (used < bytes->size() && ::ftruncate(log.descriptor_, static_cast<off_t>(used)) != 0) {
     return cannot_write(path);
+  } else {
+    log.size_ = used;
   }
   return log;
 }
@@ -146,9 +157,15 @@ Status MapLog::append(const std::vector<std::byte>& record) {
   while (written < record.size()) {
     const ssize_t count = ::write(descriptor_, record.data() + written, record.size() - written);
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) return cannot_write(path_);
+    if (count < 0) {
+      const Error error = cannot_write(path_);
+      // Without half of a record, later ones can be read.
+      if (::ftruncate(descriptor_, static_cast<off_t>(size_)) != 0) return cannot_write(path_);
+      return error;
+    }
     written += static_cast<std::size_t>(count);
   }
+  size_ += record.size();
   return {};
 }
 
@@ -159,6 +176,7 @@ std::optional<TileRecord> MapLog::find(TilePlace place) {
 }
 
 Status MapLog::put(TilePlace place, TileRecord record) {
+  QUOIN_ASSERT(record.signs.size() < kMaxRecord / 2, "a record that can be read again");
   const std::vector<std::byte> bytes = record_of(place, record, false);
   const std::scoped_lock lock(mutex_);
   if (auto done = append(bytes); !done) return done;

@@ -72,6 +72,7 @@ class MapLog {
   std::mutex mutex_;
   std::map<TilePlace, TileRecord> tiles_;
   std::size_t records_ = 0;  // in the file
+  std::uint64_t size_ = 0;   // of the file, without a record that could not be written
 };
 
 }  // namespace quoin::map

@@ -1,6 +1,7 @@
 #include "map/other_sources.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstdint>
 #include <iterator>
 #include <string>
@@ -15,6 +16,7 @@
 #include "core/bytes/files.h"
 #include "core/rows/packed_row.h"
 #include "io/placed_grids.h"
+#include "map/type_looks.h"
 
 namespace quoin::map {
 
@@ -22,18 +24,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Makes parts of chunks: one per column, from the lowest chunk to the highest.
-std::vector<IBox> columns_of(std::vector<IVec3> chunks) {
-  std::ranges::sort(chunks, {}, [](IVec3 c) { return std::tuple(c.z, c.x, c.y); });
+/// Parts of chunks: one per column, from its lowest chunk to its highest. There can be wide gaps between.
+struct Columns {
   std::vector<IBox> parts;
-  for (const IVec3 chunk : chunks) {
-    if (parts.empty() || parts.back().min.x != chunk.x || parts.back().min.z != chunk.z) {
-      parts.push_back({chunk, chunk + 1});
+  std::vector<std::vector<int>> heights;  ///< of each part's chunks, upwards
+
+  explicit Columns(std::vector<IVec3> chunks) {
+    std::ranges::sort(chunks, {}, [](IVec3 c) { return std::tuple(c.z, c.x, c.y); });
+    for (const IVec3 chunk : chunks) {
+      if (parts.empty() || parts.back().min.x != chunk.x || parts.back().min.z != chunk.z) {
+        parts.push_back({chunk, chunk + 1});
+        heights.emplace_back();
+      }
+      parts.back().max.y = chunk.y + 1;
+      heights.back().push_back(chunk.y);
     }
-    parts.back().max.y = chunk.y + 1;
   }
-  return parts;
-}
+};
 
 IBox bounds_of(const std::vector<IBox>& parts) {
   IBox bounds;
@@ -44,15 +51,12 @@ IBox bounds_of(const std::vector<IBox>& parts) {
 /// Returns a hash of the looks of all types.
 std::uint64_t hash_of_types(const VoxelRegistry& types) {
   std::uint64_t hash = kHashSeed;
-  for (std::size_t i = 0; i < types.size(); ++i) {
-    const VoxelProperties& type = types[static_cast<VoxelType>(i)];
-    const auto shown = {std::uint64_t{type.colour.r},
-                        std::uint64_t{type.colour.g},
-                        std::uint64_t{type.colour.b},
-                        std::uint64_t{type.colour.a},
-                        static_cast<std::uint64_t>(type.visibility),
-                        std::uint64_t{type.emission > 0.0F}};
-    for (const std::uint64_t value : shown) hash = mixed_with(hash, value);
+  for (std::size_t i = 1; i < types.size(); ++i) {
+    const TypeLook look = look_from_above(types, static_cast<VoxelType>(i));
+    for (const float value : {look.colour.x, look.colour.y, look.colour.z, look.coverage}) {
+      hash = mixed_with(hash, std::bit_cast<std::uint32_t>(value));
+    }
+    hash = mixed_with(hash, (look.is_fluid ? 1U : 0U) | (look.glows ? 2U : 0U));
   }
   return hash;
 }
@@ -88,14 +92,17 @@ class FixedTypes : public ChunkSource {
 
 class WorldSource final : public FixedTypes {
  public:
-  WorldSource(ChunkSourceInfo info, std::vector<IBox> parts, VoxelRegistry types, WorldStore world, std::uint32_t grid)
-      : FixedTypes(std::move(info), std::move(parts), std::move(types)), world_(std::move(world)), grid_(grid) {}
+  WorldSource(ChunkSourceInfo info, Columns columns, VoxelRegistry types, WorldStore world, std::uint32_t grid)
+      : FixedTypes(std::move(info), std::move(columns.parts), std::move(types)),
+        heights_(std::move(columns.heights)),
+        world_(std::move(world)),
+        grid_(grid) {}
 
   Result<SourcePart> read_part(std::size_t part) const override {
     QUOIN_ASSERT(part < parts().size(), "a part of the source");
     SourcePart result;
-    const IBox& box = parts()[part];
-    for (IVec3 place = box.min; place.y < box.max.y; ++place.y) {
+    for (const int y : heights_[part]) {
+      const IVec3 place{parts()[part].min.x, y, parts()[part].min.z};
       auto chunk = world_.load_chunk({.grid = grid_, .chunk = place});
       if (!chunk && chunk.error().code == ErrorCode::BadFormat) {
         result.broken.push_back(chunk.error());
@@ -109,26 +116,30 @@ class WorldSource final : public FixedTypes {
   }
 
  private:
+  std::vector<std::vector<int>> heights_;  // by part
   WorldStore world_;
   std::uint32_t grid_;
 };
 
 class SceneSource final : public FixedTypes {
  public:
-  SceneSource(ChunkSourceInfo info, std::vector<IBox> parts, VoxelRegistry types, Grid grid)
-      : FixedTypes(std::move(info), std::move(parts), std::move(types)), grid_(std::move(grid)) {}
+  SceneSource(ChunkSourceInfo info, Columns columns, VoxelRegistry types, Grid grid)
+      : FixedTypes(std::move(info), std::move(columns.parts), std::move(types)),
+        heights_(std::move(columns.heights)),
+        grid_(std::move(grid)) {}
 
   Result<SourcePart> read_part(std::size_t part) const override {
     QUOIN_ASSERT(part < parts().size(), "a part of the source");
     SourcePart result;
-    const IBox& box = parts()[part];
-    for (IVec3 place = box.min; place.y < box.max.y; ++place.y) {
+    for (const int y : heights_[part]) {
+      const IVec3 place{parts()[part].min.x, y, parts()[part].min.z};
       if (const Chunk* const chunk = grid_.find_chunk(place)) result.chunks.push_back({place, *chunk});
     }
     return result;
   }
 
  private:
+  std::vector<std::vector<int>> heights_;  // by part
   Grid grid_;
 };
 
@@ -156,10 +167,10 @@ Result<std::unique_ptr<ChunkSource>> source_of_world(WorldStore world) {
     info.warnings.push_back("the map shows the grid with the most chunks, and leaves out " +
                             with_thousands(static_cast<std::int64_t>(grids->size() - 1)) + " other grids");
   }
-  std::vector<IBox> parts = columns_of(std::move(most));
-  info.chunks = bounds_of(parts);
+  Columns columns(std::move(most));
+  info.chunks = bounds_of(columns.parts);
   return std::unique_ptr<ChunkSource>(
-      new WorldSource(std::move(info), std::move(parts), std::move(*types), std::move(world), chosen));
+      new WorldSource(std::move(info), std::move(columns), std::move(*types), std::move(world), chosen));
 }
 
 Result<std::unique_ptr<ChunkSource>> source_of_scene(LoadedScene loaded, const fs::path& path) {
@@ -176,10 +187,10 @@ Result<std::unique_ptr<ChunkSource>> source_of_scene(LoadedScene loaded, const f
   info.name = path.stem().string();
   info.warnings = std::move(loaded.warnings);
   std::ranges::move(merged->warnings, std::back_inserter(info.warnings));
-  std::vector<IBox> parts = columns_of(merged->voxels.chunks());
-  info.chunks = bounds_of(parts);
+  Columns columns(merged->voxels.chunks());
+  info.chunks = bounds_of(columns.parts);
   return std::unique_ptr<ChunkSource>(
-      new SceneSource(std::move(info), std::move(parts), loaded.scene.types, std::move(merged->voxels)));
+      new SceneSource(std::move(info), std::move(columns), loaded.scene.types, std::move(merged->voxels)));
 }
 
 }  // namespace quoin::map

@@ -5,6 +5,7 @@
 #include <bit>
 #include <chrono>
 #include <mutex>
+#include <set>
 #include <span>
 #include <system_error>
 #include <utility>
@@ -13,6 +14,7 @@
 #include <quoin/core/thousands.h>
 #include <quoin/io/file.h>
 #include <quoin/io/image_files.h>
+#include <quoin/version.h>
 
 #include "core/rows/packed_row.h"
 #include "core/work/progress_steps.h"
@@ -34,13 +36,20 @@ using map::TilePlace;
 using map::TileRecord;
 using map::TileSurfaces;
 
-/// Part of each stamp: raise it when tiles of the same world look different.
-constexpr std::uint64_t kLookVersion = 1;
+/// Begins each stamp: another version of Quoin, or of its own block pack, draws all tiles.
+std::uint64_t first_stamp() {
+  return hash_of_bytes(kHashSeed, std::as_bytes(std::span(version())));
+}
 constexpr int kRing = kTileSquares + 2;  // squares along the edge of a tile and its surroundings
 
 TilePlace tile_of(const Square& square) {
   const auto tile = [](int at) { return at >= 0 ? at / kTileSquares : (at + 1) / kTileSquares - 1; };
   return {kMapZoom, tile(square.x), tile(square.z)};
+}
+
+bool is_file(const fs::path& path) {
+  std::error_code error;
+  return fs::file_size(path, error) > 0 && !error;
 }
 
 /// Interleaves the bits of both coordinates, so that neighbours are drawn soon after each other.
@@ -72,7 +81,11 @@ class MapDrawer {
         cache_(source, layer_.ceiling) {}
 
   Result<DrawnMap> draw() {
-    auto wanted = find_stamps();
+    // Finding changes takes the first part of the time: long in worlds whose files have no times.
+    constexpr double kStampsEnd = 0.1;
+    const Progress of_stamps = part_of(progress_, 0.0, kStampsEnd);
+    const Progress of_tiles = part_of(progress_, kStampsEnd, 1.0);
+    auto wanted = find_stamps(of_stamps);
     if (!wanted) return wanted.error();
     if (auto done = remove_others(*wanted); !done) return done.error();
     std::vector<std::vector<TilePlace>> levels = changed_tiles(*wanted);
@@ -81,7 +94,7 @@ class MapDrawer {
     drawn_.tiles_kept = wanted->size() - count;
     // A tile of the last zoom takes most of the time.
     constexpr double kParentSteps = 0.05;
-    ProgressSteps steps(progress_, levels.empty() ? 1 : levels.front().size() + count / 8);
+    ProgressSteps steps(of_tiles, levels.empty() ? 1 : levels.front().size() + count / 8);
     for (std::size_t i = 0; i < levels.size(); ++i) {
       const Status done = draw_level(levels[i], *wanted, i == 0 ? 1.0 : kParentSteps, steps);
       if (!done) return done.error();
@@ -94,13 +107,15 @@ class MapDrawer {
  private:
   /// Returns the stamps of all tiles: of those of the last zoom from the parts that they show or that darken them, of
   /// others from the four that they are made of.
-  Result<Stamps> find_stamps() {
+  Result<Stamps> find_stamps(const Progress& progress) {
     const std::vector<Square>& squares = cache_.squares();
     std::vector<std::uint64_t> of_square(squares.size());
     std::mutex mutex;
     std::optional<Error> error;
+    ProgressSteps steps(progress, squares.size());
     const auto now = static_cast<std::uint64_t>(std::chrono::system_clock::now().time_since_epoch().count());
     parallel_for(squares.size(), options_.threads, [&](std::size_t i) {
+      if (steps.cancelled()) return;
       std::uint64_t stamp = kHashSeed;
       for (const std::size_t part : squares[i].parts) {
         const auto own = source_.part_stamp(part);
@@ -113,8 +128,10 @@ class MapDrawer {
         stamp = mixed_with(stamp, *own == 0 ? mixed_with(now, part) : *own);
       }
       of_square[i] = stamp;
+      steps.step();
     });
     if (error) return *error;
+    if (steps.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
     Stamps stamps;
     for (std::size_t i = 0; i < squares.size(); ++i) stamps.try_emplace(tile_of(squares[i]), 0);
     for (auto& [place, stamp] : stamps) stamp = stamp_of_tile(place, of_square);
@@ -123,7 +140,7 @@ class MapDrawer {
   }
 
   std::uint64_t stamp_of_tile(TilePlace place, const std::vector<std::uint64_t>& of_square) const {
-    std::uint64_t stamp = mixed_with(kHashSeed, kLookVersion);
+    std::uint64_t stamp = first_stamp();
     for (int i = 0; i < kRing * kRing; ++i) {
       const auto square = cache_.find(place.x * kTileSquares - 1 + i % kRing, place.y * kTileSquares - 1 + i / kRing);
       if (square) stamp = mixed_with(mixed_with(stamp, static_cast<std::uint64_t>(i)), of_square[*square]);
@@ -144,7 +161,7 @@ class MapDrawer {
       std::ranges::sort(parents);
       parents.erase(std::unique(parents.begin(), parents.end()), parents.end());
       for (const TilePlace parent : parents) {
-        std::uint64_t stamp = mixed_with(kHashSeed, kLookVersion);
+        std::uint64_t stamp = first_stamp();
         for (int i = 0; i < 4; ++i) {
           const auto child = stamps.find(parent.child(i));
           if (child != stamps.end())
@@ -172,15 +189,20 @@ class MapDrawer {
     return {};
   }
 
-  /// Returns the tiles to draw, by zoom from the last one up, neighbours after each other.
+  /// Returns the tiles to draw, by zoom from the last one up, neighbours after each other: those whose sources have
+  /// changed, and those whose file is missing, with the tiles of lower zooms that they are part of.
   std::vector<std::vector<TilePlace>> changed_tiles(const Stamps& wanted) const {
-    std::map<int, std::vector<TilePlace>, std::greater<>> by_zoom;
+    std::map<int, std::set<TilePlace>, std::greater<>> by_zoom;
     for (const auto& [place, stamp] : wanted) {
       const auto known = log_.tiles().find(place);
-      if (known == log_.tiles().end() || known->second.stamp != stamp) by_zoom[place.z].push_back(place);
+      const bool is_there = known != log_.tiles().end() && known->second.stamp == stamp &&
+                            (!known->second.has_file || is_file(layer_.tile(place)));
+      if (is_there) continue;
+      for (TilePlace each = place; wanted.contains(each) && by_zoom[each.z].insert(each).second;) each = each.parent();
     }
     std::vector<std::vector<TilePlace>> levels;
-    for (auto& [zoom, places] : by_zoom) {
+    for (auto& [zoom, chosen] : by_zoom) {
+      std::vector<TilePlace> places(chosen.begin(), chosen.end());
       std::ranges::sort(places, {}, morton_of);
       levels.push_back(std::move(places));
     }
@@ -232,9 +254,9 @@ class MapDrawer {
       const auto record = log_.find(child);
       if (!record || !record->has_file) continue;
       auto image = read_alpha_image(layer_.tile(child));
-      if (!image) return image.error();
-      if (image->width != map::kTileEdge || image->height != map::kTileEdge) {
-        return make_error(ErrorCode::BadFormat, "not a tile of this map; delete the folder to draw it again",
+      const bool is_tile = image && image->width == map::kTileEdge && image->height == map::kTileEdge;
+      if (!is_tile) {
+        return make_error(ErrorCode::BadFormat, "a damaged tile; delete it, and the next run draws it again",
                           layer_.tile(child).string());
       }
       children[static_cast<std::size_t>(i)] = std::move(*image);
@@ -298,11 +320,12 @@ Result<DrawnMap> draw_map(const ChunkSource& source, const fs::path& folder, con
   if (!opened) return opened.error();
   auto log = MapLog::open(opened->layer().log, opened->identity());
   if (!log) return log.error();
-  // The page first: it shows the tiles that exist already.
-  if (auto done = opened->write_page(source, *log); !done) return done.error();
   auto drawn = MapDrawer(source, opened->layer(), *log, options, progress).draw();
+  // The page shows the tiles that exist, also after an error or a cancelled run.
+  const Status written = opened->write_page(source, *log);
   if (!drawn) return drawn;
-  if (auto done = opened->write_page(source, *log); !done) return done.error();
+  if (!written && written.error().code != ErrorCode::Unsupported) return written.error();
+  if (!written) drawn->warnings.push_back(to_string(written.error()));
   drawn->warnings.insert(drawn->warnings.begin(), source.info().warnings.begin(), source.info().warnings.end());
   for (const Error& error : source.info().broken) drawn->warnings.push_back("left out: " + to_string(error));
   return drawn;

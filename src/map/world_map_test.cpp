@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <set>
@@ -45,8 +46,9 @@ class TestWorld final : public ChunkSource {
  public:
   using Fill = std::function<void(Chunk& chunk, IVec3 corner)>;
 
-  TestWorld(std::vector<IBox> parts, Fill fill, const std::string& name = "test")
-      : ChunkSource(info_of(name), std::move(parts)), fill_(std::move(fill)) {}
+  TestWorld(std::vector<IBox> parts, Fill fill, const std::string& name = "test", const std::string& dimension = {},
+            std::vector<std::string> dimensions = {})
+      : ChunkSource(info_of(name, dimension, std::move(dimensions)), std::move(parts)), fill_(std::move(fill)) {}
 
   VoxelRegistry types() const override { return types_of_test(); }
   Result<SourcePart> read_part(std::size_t part) const override {
@@ -76,10 +78,13 @@ class TestWorld final : public ChunkSource {
   std::vector<SourceSign> signs;
 
  private:
-  static ChunkSourceInfo info_of(const std::string& name) {
+  static ChunkSourceInfo info_of(const std::string& name, const std::string& dimension,
+                                 std::vector<std::string> dimensions) {
     ChunkSourceInfo info;
     info.format = "test";
     info.name = name;
+    info.dimension = dimension;
+    info.dimensions = std::move(dimensions);
     return info;
   }
   Fill fill_;
@@ -303,6 +308,91 @@ TEST_F(WorldMap, IgnoresDamagedEndOfLog) {
     ASSERT_TRUE(write_file(bytes, file));
     ASSERT_TRUE(draw(world)) << at;
     EXPECT_EQ(files_in(folder_), files) << at;
+  }
+}
+
+TEST_F(WorldMap, DrawsMissingTilesAgainAndNamesDamagedOnes) {
+  TestWorld world(square_of_parts(-6, 6), fill_hills);
+  ASSERT_TRUE(draw(world));
+  const auto files = files_in(folder_);
+  fs::remove(folder_ / "tiles/18/0/0.png");
+  ASSERT_TRUE(write_file({}, folder_ / "tiles/18/-1/0.png"));
+  const auto drawn = draw(world);
+  ASSERT_TRUE(drawn);
+  EXPECT_GE(drawn->tiles_written, 4U) << "and the tiles that they are part of";
+  EXPECT_EQ(files_in(folder_), files);
+  fs::remove_all(folder_ / "tiles");
+  ASSERT_TRUE(draw(world));
+  EXPECT_EQ(files_in(folder_), files);
+  const std::string text = "no image";
+  ASSERT_TRUE(write_file(std::as_bytes(std::span(text)), folder_ / "tiles/18/0/0.png"));
+  world.versions[static_cast<std::size_t>(6 * 12 + 11)] = 2;  // in the tile to the right
+  const auto damaged = draw(world);
+  ASSERT_FALSE(damaged);
+  EXPECT_EQ(damaged.error().code, ErrorCode::BadFormat);
+  EXPECT_NE(damaged.error().message.find("delete it"), std::string::npos);
+  fs::remove(damaged.error().path);
+  ASSERT_TRUE(draw(world));
+  EXPECT_EQ(files_in(folder_), files);
+}
+
+TEST_F(WorldMap, WritesNewLogWhenMostRecordsAreOld) {
+  TestWorld world(square_of_parts(-2, 2), fill_hills);
+  const fs::path log = folder_ / "state" / "overworld.log";
+  std::uintmax_t largest = 0;
+  bool has_shrunk = false;
+  for (std::uint64_t run = 2; run < 600 && !has_shrunk; ++run) {
+    world.versions[0] = run;
+    ASSERT_TRUE(draw(world, 1));
+    has_shrunk = fs::file_size(log) < largest / 2;
+    largest = std::max(largest, fs::file_size(log));
+  }
+  EXPECT_TRUE(has_shrunk);
+  EXPECT_EQ(draw(world)->tiles_written, 0U) << "the new log has all tiles";
+}
+
+TEST_F(WorldMap, KeepsDimensionsApartAndRemovesDeletedOnes) {
+  const std::vector<std::string> all = {"minecraft:overworld", "a:b/c", "a:b-c", "../../x"};
+  for (const std::string& dimension : all) {
+    ASSERT_TRUE(draw(TestWorld(square_of_parts(0, 1), fill_hills, "test", dimension, all))) << dimension;
+  }
+  const auto names = [&] {
+    std::set<std::string> found;
+    for (const auto& entry : fs::directory_iterator(folder_ / "tiles")) found.insert(entry.path().filename().string());
+    return found;
+  };
+  EXPECT_EQ(names(), (std::set<std::string>{"18", "17", "dimension-a.3ab.2fc", "dimension-a.3ab-c",
+                                            "dimension-.2e.2e.2f.2e.2e.2fx"}));
+  const std::vector<std::string> fewer = {"minecraft:overworld", "a:b-c"};
+  ASSERT_TRUE(draw(TestWorld(square_of_parts(0, 1), fill_hills, "test", "minecraft:overworld", fewer)));
+  EXPECT_EQ(names(), (std::set<std::string>{"18", "17", "dimension-a.3ab-c"}));
+  const auto layers = *read_file(folder_ / "layers.js");
+  EXPECT_EQ(std::string(reinterpret_cast<const char*>(layers.data()), layers.size()).find("2fc"), std::string::npos);
+}
+
+TEST_F(WorldMap, FollowsLinkedFolderOfTiles) {
+  fs::create_directories(folder_);
+  const fs::path elsewhere = folder_ / "elsewhere";
+  fs::create_directories(elsewhere);
+  fs::create_directory_symlink("elsewhere", folder_ / "tiles");
+  ASSERT_TRUE(draw(TestWorld(square_of_parts(0, 1), fill_hills)));
+  EXPECT_TRUE(fs::exists(elsewhere / "18/0/0.png"));
+  const auto layers = *read_file(folder_ / "layers.js");
+  const std::string text(reinterpret_cast<const char*>(layers.data()), layers.size());
+  EXPECT_NE(text.find("\"tiles\":\"tiles\""), std::string::npos) << text;
+}
+
+TEST_F(WorldMap, DrawsHeightsNearLimits) {
+  constexpr int kChunks = 1 << 25;  // the coordinate of the highest chunk, plus 1
+  const TestWorld world({{{0, kChunks - 1, 0}, {1, kChunks, 1}}, {{1, -kChunks, 0}, {2, -kChunks + 1, 1}}},
+                        [](Chunk& chunk, IVec3) { chunk.fill_row(63, 5, ~std::uint64_t{0}, kLamp); });
+  ASSERT_TRUE(draw(world));
+  const AlphaImage image = tile(18, 0, 0);
+  EXPECT_EQ(pixel(image, 3, 5), (std::array{250, 200, 90, 255}));
+  EXPECT_EQ(pixel(image, 70, 5), (std::array{250, 200, 90, 255}));
+  fs::remove_all(folder_);
+  for (const int ceiling : {std::numeric_limits<int>::max(), std::numeric_limits<int>::min()}) {
+    EXPECT_TRUE(draw_map(world, folder_ / std::to_string(ceiling), {.tiles = MapTiles::Png, .ceiling = ceiling}));
   }
 }
 

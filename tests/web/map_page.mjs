@@ -174,6 +174,11 @@ for (let i = 0; i < 6; ++i) {
 check((await view()).zoom < -1, 'the button zooms out');
 await shot('far');
 
+for (const garbage of ['#50%', '#%E0%A4%A', '#overworld/99/1e308/0', '#overworld/0/1/NaN', '#nowhere/0/0/0']) {
+  await open(garbage);
+  check(Object.keys(await shown()).length > 0, `tiles are shown at ${garbage}`);
+}
+
 await open('#overworld/1/100/90');
 await page.click('.marker.sign');
 await page.waitForSelector('.leaflet-popup-content');

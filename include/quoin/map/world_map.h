@@ -39,8 +39,8 @@ struct DrawnMap {
   std::vector<std::string> warnings{};
 };
 
-/// Opens a world to draw: of Minecraft or Luanti, as open_chunk_source; the largest grid of a .quoin world; or the scene
-/// of any other file with voxels, which is loaded whole (load_scene).
+/// Opens a world to draw: of Minecraft or Luanti, as open_chunk_source; the largest grid of a .quoin world; or the
+/// scene of any other file with voxels, which is loaded whole (load_scene).
 ///
 /// Errors: those of open_chunk_source, WorldStore and load_scene; Unsupported for scenes with density fields, voxels of
 ///         different sizes, or rotations other than by multiples of 90 degrees.
@@ -63,10 +63,10 @@ struct DrawnMap {
 /// Updates: FOLDER/state has a stamp of each tile's sources. Tiles with unchanged sources are kept, and those without
 ///          chunks are removed. A run that was interrupted, also by a power cut, continues. Files appear whole or not
 ///          at all.
-/// Live:    the world may be saved meanwhile; a chunk that is being written is drawn by the next run.
+/// Live:    Minecraft may save chunks meanwhile; the next run draws them. Other sources must not change.
 /// Damage:  an unreadable chunk is a hole in the map; warnings name and count them.
 /// Order:   the same world gives the same files, on any number of threads and however it was interrupted.
-/// Memory:  about 100 MB, and 100 bytes per tile.
+/// Memory:  about 100 MB, and 2 kB per tile of zoom kMapZoom.
 /// Errors:  CannotRead, CannotWrite; InvalidArgument if the folder holds a map of another world or with other options,
 ///          or another process draws it; Unsupported for WebP in builds without it; Cancelled.
 [[nodiscard]] Result<DrawnMap> draw_map(const ChunkSource& source, const std::filesystem::path& folder,

@@ -278,7 +278,7 @@ class LuantiSource final : public ChunkSource {
       ChunkBuilder builder(types_);
       ColumnScan scan(top);
       for (IVec3 place = box.max - 1; place.y >= box.min.y && !scan.is_done(); --place.y) {
-        if (place.y * kChunkEdge > top) continue;
+        if (std::int64_t{place.y} * kChunkEdge > top) continue;
         const auto chunk = read_chunk(reader, place, builder, result.broken);
         if (!chunk) return chunk.error();
         scan.visit(place, *chunk, visit);

@@ -5,6 +5,7 @@
 #include <list>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <system_error>
@@ -223,13 +224,21 @@ class MinecraftSource final : public ChunkSource {
       located.byte_offset = file.offset(chunk.x, chunk.z);
       broken.push_back(std::move(located));
     };
-    const auto bytes = read_bytes(file, name, chunk);
+    auto bytes = file.read(chunk.x, chunk.z);
+    constexpr std::size_t kMaxValues = std::size_t{1} << 20;
+    constexpr nbt::Limits kLimits{.depth = 512, .nodes = kMaxValues};
+    auto document = bytes ? nbt::Document::parse(*bytes, kLimits) : Result<nbt::Document>(bytes.error());
+    if (!document || !is_at(document->root(), place)) {
+      // The game may have moved the chunk since the region's table was read.
+      if (auto moved = read_moved(file, name, chunk)) {
+        bytes = std::move(*moved);
+        document = nbt::Document::parse(*bytes, kLimits);
+      }
+    }
     if (!bytes) {
       broken.push_back(bytes.error());
       return {};
     }
-    constexpr std::size_t kMaxValues = std::size_t{1} << 20;
-    const auto document = nbt::Document::parse(*bytes, {.depth = 512, .nodes = kMaxValues});
     if (!document) {
       report(document.error());
       return {};
@@ -242,14 +251,23 @@ class MinecraftSource final : public ChunkSource {
     return used;
   }
 
-  /// Reads a chunk. The game may have moved it since the region's table was read: then reads it by the present table.
-  static Result<std::vector<std::byte>> read_bytes(const RegionFile& file, RegionName name, IVec3 chunk) {
-    auto bytes = file.read(chunk.x, chunk.z);
-    if (bytes || file.path().empty() || file.is_expanded_whole()) return bytes;
+  /// Returns false if a chunk says that it belongs elsewhere. Programs that copy chunks may not care.
+  static bool is_at(nbt::Value root, IVec3 place) {
+    const nbt::Value level = root["Level"] ? root["Level"] : root;
+    const auto x = level["xPos"].integer();
+    const auto z = level["zPos"].integer();
+    return !x || !z || (*x == place.x && *z == place.z);
+  }
+
+  /// Reads a chunk by the region's present table, if its entry has changed.
+  static std::optional<std::vector<std::byte>> read_moved(const RegionFile& file, RegionName name, IVec3 chunk) {
+    if (file.path().empty() || file.is_expanded_whole()) return std::nullopt;
     const auto present = RegionFile::open(file.path(), name);
     const bool has_moved = present && (*present)->has(chunk.x, chunk.z) &&
                            (*present)->stamp(chunk.x, chunk.z) != file.stamp(chunk.x, chunk.z);
-    return has_moved ? (*present)->read(chunk.x, chunk.z) : bytes;
+    if (!has_moved) return std::nullopt;
+    auto bytes = (*present)->read(chunk.x, chunk.z);
+    return bytes ? std::optional(std::move(*bytes)) : std::nullopt;
   }
 
   static IVec3 corner_of(IVec3 place, const Section& section) {
@@ -259,7 +277,8 @@ class MinecraftSource final : public ChunkSource {
   static void visit_section(const Section& section, const SectionTypes& types, IVec3 corner, int top,
                             std::array<std::uint16_t, kSectionEdge>& open,
                             FunctionRef<bool(IVec3 voxel, VoxelType type)> visit) {
-    for (int y = std::min(kSectionEdge - 1, top - corner.y); y >= 0; --y) {
+    const std::int64_t below = std::int64_t{top} - corner.y;
+    for (auto y = static_cast<int>(std::clamp<std::int64_t>(below, -1, kSectionEdge - 1)); y >= 0; --y) {
       for (int z = 0; z < kSectionEdge; ++z) {
         std::uint16_t& columns = open[static_cast<std::size_t>(z)];
         for (unsigned rest = columns; rest != 0; rest &= rest - 1) {

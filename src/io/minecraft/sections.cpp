@@ -251,7 +251,8 @@ Status SectionReader::read(nbt::Value root, SectionOrder order, int top, Functio
   // A section without a height is broken, which `read_section` reports.
   stored.for_each([&](nbt::Value section) {
     const auto y = std::clamp<std::int64_t>(section["Y"].integer().value_or(0), -kMaxSection, kMaxSection);
-    if (y * kSectionEdge <= top) sections_.emplace_back(static_cast<int>(y), section);
+    const bool is_valid = y >= -128 && y <= 127;
+    if (!is_valid || y * kSectionEdge <= top) sections_.emplace_back(static_cast<int>(y), section);
   });
   if (order == SectionOrder::Downwards) {
     std::ranges::stable_sort(sections_, std::greater(), [](const auto& each) { return each.first; });

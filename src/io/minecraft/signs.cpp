@@ -1,7 +1,8 @@
 #include "io/minecraft/signs.h"
 
-#include <array>
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -15,12 +16,17 @@ namespace quoin::minecraft {
 namespace {
 
 constexpr int kMaxTextDepth = 32;
-constexpr std::size_t kMaxLineBytes = 4'096;  // a line of the game has some 100
+constexpr std::size_t kMaxLineBytes = 1'024;  // a line of the game has some 100
+constexpr std::size_t kMaxLines = 4;          // of a side
+
+/// Text beyond this is not looked at, with its formatting codes.
+constexpr std::size_t kMaxStored = 4 * kMaxLineBytes;
 
 // Text components: a string, a list of components, or an object with "text" and more components in "extra". Translated
 // texts and selectors have no text of their own.
 
 void add_text(const nlohmann::json& component, std::string& text) {
+  if (text.size() > kMaxStored) return;
   if (component.is_string()) {
     text += component.get_ref<const std::string&>();
   } else if (component.is_array()) {
@@ -32,6 +38,7 @@ void add_text(const nlohmann::json& component, std::string& text) {
 }
 
 void add_text(nbt::Value component, int depth, std::string& text) {
+  if (text.size() > kMaxStored) return;
   if (const auto own = component.text()) {
     text += *own;
   } else if (depth < kMaxTextDepth && component.tag() == nbt::Tag::List) {
@@ -70,7 +77,9 @@ std::string text_of_sign(nbt::Value sign) {
   std::string text;
   for (const char* const side : {"front_text", "back_text"}) {
     lines.clear();
-    sign[side]["messages"].for_each([&](nbt::Value line) { lines.push_back(line); });
+    sign[side]["messages"].for_each([&](nbt::Value line) {
+      if (lines.size() < kMaxLines) lines.push_back(line);
+    });
     const std::string own = text_of_side(lines);
     if (!own.empty()) text += (text.empty() ? "" : "\n") + own;
   }
@@ -82,17 +91,19 @@ std::string text_of_sign(nbt::Value sign) {
 std::string text_of_line(nbt::Value line) {
   std::string text;
   if (const auto stored = line.text()) {
-    text = text_of_json(*stored);
+    text = text_of_json(stored->substr(0, kMaxStored));
   } else {
     add_text(line, 0, text);
   }
   // Old formatting codes: a section sign and a letter.
   constexpr std::string_view kSectionSign = "\xC2\xA7";
-  for (std::size_t at = text.find(kSectionSign); at != std::string::npos; at = text.find(kSectionSign, at)) {
-    text.erase(at, kSectionSign.size() + 1);
+  std::string plain;
+  for (std::size_t at = 0; at < text.size() && plain.size() < kMaxLineBytes;) {
+    const std::size_t code = std::min(text.find(kSectionSign, at), text.size());
+    plain.append(text, at, std::min(code - at, kMaxLineBytes - plain.size()));
+    at = code + kSectionSign.size() + 1;
   }
-  if (text.size() > kMaxLineBytes) text.resize(kMaxLineBytes);
-  return printable(text);
+  return printable(plain);
 }
 
 void add_signs(nbt::Value root, std::vector<SourceSign>& signs) {
@@ -103,7 +114,11 @@ void add_signs(nbt::Value root, std::vector<SourceSign>& signs) {
     const auto x = entity["x"].integer();
     const auto y = entity["y"].integer();
     const auto z = entity["z"].integer();
-    if (!x || !y || !z) return;
+    const auto is_place = [](const std::optional<std::int64_t>& at) {
+      constexpr std::int64_t kFarthest = std::int64_t{1} << 30;
+      return at && *at >= -kFarthest && *at < kFarthest;
+    };
+    if (!is_place(x) || !is_place(y) || !is_place(z)) return;
     std::string text = text_of_sign(entity);
     if (text.empty()) return;
     signs.push_back({{static_cast<int>(*x), static_cast<int>(*y), static_cast<int>(*z)}, std::move(text)});

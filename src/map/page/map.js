@@ -16,7 +16,7 @@
 
   let current = null;  // the layer
   let shown = null;    // its tiles
-  let marks = L.layerGroup();
+  const marks = L.layerGroup().addTo(map);
   let areMarksShown = true;
 
   function isDark() {
@@ -38,17 +38,21 @@
     return box;
   }
 
-  function addMarkers(layer) {
+  // Only markers in view, and not more than a phone can draw.
+  const mostMarkers = 400;
+  function addMarkers() {
     marks.clearLayers();
-    for (const {x, z, y, text, kind} of markers[layer.key] || []) {
+    if (!current || !areMarksShown) return;
+    const view = map.getBounds().pad(0.1);
+    const inView = (markers[current.key] || []).filter(({x, z}) => view.contains([z, x]));
+    for (const {x, z, y, text, kind} of inView.slice(0, mostMarkers)) {
       const size = kind === 'spawn' ? 18 : 12;
       const icon = L.divIcon({className: 'marker ' + (kind === 'spawn' ? 'spawn' : 'sign'), iconSize: [size, size]});
       const place = '(' + x + ', ' + y + ', ' + z + ')';
       L.marker([z + 0.5, x + 0.5], {icon, title: text.split('\n')[0], keyboard: true})
-        .bindPopup(textElement(text + '\n' + place))
+        .bindPopup(textElement(text + '\n' + place), {autoPan: false})
         .addTo(marks);
     }
-    if (areMarksShown) marks.addTo(map);
   }
 
   function show(layer, view) {
@@ -75,17 +79,24 @@
       map.fitBounds(boundsOf(layer.content), {animate: false, maxZoom: 2});
     }
     element('layers').value = layer.key;
-    addMarkers(layer);
+    addMarkers();
     writeAddress();
   }
 
   // The address: #LAYER/ZOOM/X/Z.
   function readAddress() {
-    const [key, zoom, x, z] = decodeURIComponent(location.hash.slice(1)).split('/');
+    let text = '';
+    try {
+      text = decodeURIComponent(location.hash.slice(1));
+    } catch (error) { /* an address that was cut off */ }
+    const [key, zoom, x, z] = text.split('/');
     const layer = layers.find((each) => each.key === key);
     const numbers = [zoom, x, z].map(Number);
-    if (!layer || !numbers.every(Number.isFinite) || z === undefined) return {layer, view: null};
-    return {layer, view: {zoom: numbers[0], x: numbers[1], z: numbers[2]}};
+    const farthest = 2 ** 31;
+    const isPlace = z !== undefined && numbers.every((number) => Math.abs(number) <= farthest);
+    if (!layer || !isPlace) return {layer, view: null};
+    const nearest = Math.min(Math.max(numbers[0], layer.zooms[0] - lastZoom - 2), closest);
+    return {layer, view: {zoom: nearest, x: numbers[1], z: numbers[2]}};
   }
   function writeAddress() {
     if (!current) return;
@@ -127,7 +138,7 @@
   element('markers').addEventListener('click', (event) => {
     areMarksShown = !areMarksShown;
     event.target.setAttribute('aria-pressed', String(areMarksShown));
-    if (areMarksShown) marks.addTo(map); else marks.remove();
+    addMarkers();
   });
   let wish = null;
   try {
@@ -138,6 +149,7 @@
   map.on('mousemove click', (event) => showPlace(event.latlng));
   map.on('move', () => showPlace(map.getCenter()));
   map.on('moveend zoomend', writeAddress);
+  map.on('moveend', () => document.querySelector('.leaflet-popup') || addMarkers());
   map.on('zoomend', () => element('map').classList.toggle('smooth', map.getZoom() < 0));
   window.addEventListener('hashchange', () => {
     const {layer, view} = readAddress();
