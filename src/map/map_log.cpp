@@ -194,7 +194,7 @@ Status MapLog::remove(TilePlace place) {
 }
 
 Status MapLog::compact() {
-  constexpr std::size_t kFew = 1'000;
+  constexpr std::size_t kFew = 100;
   if (records_ <= 2 * tiles_.size() + kFew) return {};
   std::vector<std::byte> bytes = heading(identity_);
   for (const auto& [place, record] : tiles_) {
