@@ -104,8 +104,10 @@ constexpr LightRow kLights[] = {
 };
 static_assert(std::ranges::is_sorted(kLights, {}, &LightRow::name));
 
-/// Returns the name whose rows a block has: those of candles of all colours, and without wax.
+/// Returns the name whose rows a block has: without the namespace and wax, and that of candles of all colours.
 std::string_view listed_name(std::string_view name) {
+  constexpr std::string_view kNamespace = "minecraft:";
+  if (name.starts_with(kNamespace)) name.remove_prefix(kNamespace.size());
   if (name.ends_with("_candle")) return "candle";
   if (name.ends_with("_candle_cake")) return "candle_cake";
   constexpr std::string_view kWaxed = "waxed_";
@@ -143,8 +145,6 @@ constexpr std::string_view kNotOpen[] = {"piston_head", "sea_lantern", "jack_o_l
 
 std::optional<int> light_level_of_block(std::string_view name,
                                         std::span<const std::pair<std::string, std::string>> properties) {
-  constexpr std::string_view kNamespace = "minecraft:";
-  if (name.starts_with(kNamespace)) name.remove_prefix(kNamespace.size());
   name = listed_name(name);
   const auto rows = std::ranges::equal_range(kLights, name, {}, &LightRow::name);
   if (rows.empty()) return std::nullopt;
@@ -158,6 +158,18 @@ std::optional<int> light_level_of_block(std::string_view name,
   if (name == "candle") return row->level * count_of(properties, "candles");
   if (name == "sea_pickle") return row->level * (1 + count_of(properties, "pickles"));
   return row->level;
+}
+
+std::vector<std::string_view> light_properties_of_block(std::string_view name) {
+  std::vector<std::string_view> keys;
+  name = listed_name(name);
+  const auto add = [&](std::string_view key) {
+    if (!key.empty() && std::ranges::find(keys, key) == keys.end()) keys.push_back(key);
+  };
+  for (const LightRow& row : std::ranges::equal_range(kLights, name, {}, &LightRow::name)) add(row.key);
+  if (name == "candle") add("candles");
+  if (name == "sea_pickle") add("pickles");
+  return keys;
 }
 
 void set_passage(std::string_view name, BlockLook& look) {

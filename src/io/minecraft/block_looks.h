@@ -110,6 +110,9 @@ void set_passage(std::string_view name, BlockLook& look);
 [[nodiscard]] std::optional<int> light_level_of_block(std::string_view name,
                                                       std::span<const std::pair<std::string, std::string>> properties);
 
+/// Returns the keys of the properties that decide this level: at most two, and none for blocks that are not listed.
+[[nodiscard]] std::vector<std::string_view> light_properties_of_block(std::string_view name);
+
 /// Returns the look of a block. `name`: "minecraft:oak_stairs", or without its namespace; also of mods. `is_lit`,
 /// `is_snowy`: the states of these names are "true". Cost: some look-ups in sorted tables.
 [[nodiscard]] BlockLook look_of_block(std::string_view name, bool is_lit, bool is_snowy);

@@ -1,6 +1,7 @@
 // The faces of blocks that emit light: rules by name, and light_emission of models.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -203,44 +204,48 @@ TEST(PackEmission, NamesFaultsOfRules) {
   EXPECT_NE(error_of(R"([["a", ""], ["a", ""]])").find("is in two rows"), std::string::npos);
 }
 
-// Adds a block with a lower half that has this light_emission, and an upper half without.
-PackBuilder pack_with_light(const std::string& light) {
+// Blocks with a lower half that has this light_emission, and an upper half: stone, two torches, and an ore of a mod.
+PackBuilder pack_with_light(const std::string& light, const std::string& light_above = "") {
   PackBuilder pack;
   pack.texture("block/red", packs_test::plain_png({200, 20, 20}));
-  const auto box = [](const char* from, const char* to, const std::string& more) {
-    return std::string(R"({"from": [)") + from + R"(], "to": [)" + to + "]" + more +
+  const auto box = [](const char* from, const char* to, const std::string& level) {
+    return std::string(R"({"from": [)") + from + R"(], "to": [)" + to + "]" +
+           (level.empty() ? "" : ", \"light_emission\": " + level) +
            R"(, "faces": {"north": {"texture": "block/red"}, "up": {"texture": "block/red"}}})";
   };
-  const std::string model = R"({"elements": [)" +
-                            box("0, 0, 0", "16, 8, 16", light.empty() ? "" : ", \"light_emission\": " + light) + ", " +
-                            box("0, 8, 0", "16, 16, 16", "") + "]}";
-  for (const char* name : {"stone", "torch", "soul_torch"}) {
-    pack.model("block/" + std::string(name), model);
-    pack.states(name, R"({"variants": {"": {"model": "block/)" + std::string(name) + "\"}}}");
+  pack.model("block/halves", R"({"elements": [)" + box("0, 0, 0", "16, 8, 16", light) + ", " +
+                                 box("0, 8, 0", "16, 16, 16", light_above) + "]}");
+  const std::string states = R"({"variants": {"": {"model": "block/halves"}}})";
+  for (const char* name : {"stone", "torch", "soul_torch", "redstone_torch"}) pack.states(name, states);
+  for (const char* name : {"ore", "glow_stone"}) {
+    pack.put_asset("mod/blockstates/" + std::string(name) + ".json", states);
   }
   return pack;
 }
 
+// Returns the shares of the lower and the upper half.
+std::array<int, 2> shares_of_halves(const VoxelProperties& type) {
+  std::array<int, 2> found{-1, -1};
+  for (const SideOfShape& side : sides_of(type)) found[side.element->min.y > 0.0F ? 1 : 0] = side.look.emission_share;
+  return found;
+}
+
+VoxelProperties look_of(const PackBuilder& pack, const char* name, const Properties& properties = {}) {
+  return BlockLooks(pack.files()).applied(block(name, properties).type);
+}
+
 TEST(PackEmission, ReadsLightOfElements) {
-  const auto shares = [](const VoxelProperties& type) {
-    std::array<int, 2> found{-1, -1};
-    for (const SideOfShape& side : sides_of(type)) found[side.element->min.y > 0.0F ? 1 : 0] = side.look.emission_share;
-    return found;
-  };
-  const auto look_of = [](const PackBuilder& pack, const char* name) {
-    return BlockLooks(pack.files()).applied(block(name).type);
-  };
-  // Stone does not emit, so it has the light of its elements.
-  const VoxelProperties stone = look_of(pack_with_light("9"), "stone");
-  EXPECT_FLOAT_EQ(stone.emission, 9.0F / 15.0F);
-  EXPECT_EQ(shares(stone), (std::array{255, 0}));
+  // The ore does not emit, so it has the light of its elements.
+  const VoxelProperties ore = look_of(pack_with_light("9", "3"), "mod:ore");
+  EXPECT_FLOAT_EQ(ore.emission, 9.0F / 15.0F);
+  EXPECT_EQ(shares_of_halves(ore), (std::array{255, 85}));
   // A soul torch has level 10: an element of level 4 shows less.
   const VoxelProperties torch = look_of(pack_with_light("4"), "soul_torch");
   EXPECT_FLOAT_EQ(torch.emission, 10.0F / 15.0F);
-  EXPECT_EQ(shares(torch), (std::array{102, 0}));
-  EXPECT_EQ(shares(look_of(pack_with_light("15"), "soul_torch")), (std::array{255, 0}));
+  EXPECT_EQ(shares_of_halves(torch), (std::array{102, 0}));
+  EXPECT_EQ(shares_of_halves(look_of(pack_with_light("15"), "soul_torch")), (std::array{255, 0}));
   // Without light_emission, the rule for torches counts.
-  EXPECT_EQ(shares(look_of(pack_with_light(""), "torch")), (std::array{0, 255}));
+  EXPECT_EQ(shares_of_halves(look_of(pack_with_light(""), "torch")), (std::array{0, 255}));
   EXPECT_EQ(look_of(pack_with_light(""), "stone").emission, 0.0F);
   for (const char* wrong : {"16", "-1", "1.5", "\"9\"", "null"}) {
     BlockLooks looks(pack_with_light(wrong).files());
@@ -249,6 +254,80 @@ TEST(PackEmission, ReadsLightOfElements) {
     EXPECT_NE(looks.report().names[0].find("\"light_emission\" is not a whole number from 0 to 15"), std::string::npos)
         << looks.report().names[0];
   }
+}
+
+TEST(PackEmission, DarkBlocksOfTheGameOnlyLookLit) {
+  const VoxelProperties stone = look_of(pack_with_light("15", "5"), "stone");
+  EXPECT_GT(stone.emission, 0.0F);
+  EXPECT_EQ(std::lround(15.0F * stone.emission), 0) << "the level of propagated light";
+  EXPECT_EQ(shares_of_halves(stone), (std::array{255, 85}));
+}
+
+TEST(PackEmission, DarkStatesStayDark) {
+  PackBuilder pack = pack_with_light("15");
+  pack.model("block/dark", R"({"elements": [{"from": [0, 0, 0], "to": [16, 8, 16],
+    "faces": {"up": {"texture": "block/red"}}}]})");
+  pack.states("cave_vines", R"({"variants": {"berries=true": {"model": "block/halves"},
+    "berries=false": {"model": "block/dark"}}})");
+  pack.states("respawn_anchor", R"({"variants": {"charges=4": {"model": "block/halves"},
+    "charges=0": {"model": "block/dark"}, "charges=1": {"model": "block/dark"}, "charges=2": {"model": "block/dark"},
+    "charges=3": {"model": "block/dark"}}})");
+  const auto vines = [&](const char* berries) {
+    return look_of(pack, "cave_vines", {{"age", "3"}, {"berries", berries}});
+  };
+  EXPECT_EQ(vines("false").emission, 0.0F);
+  EXPECT_FALSE(vines("false").shapes.empty());
+  EXPECT_FLOAT_EQ(vines("true").emission, 14.0F / 15.0F);
+  // The model of this dark state has light, so the torch looks lit.
+  EXPECT_LT(look_of(pack, "redstone_torch", {{"lit", "false"}}).emission, 1.0F / 30.0F);
+  EXPECT_FLOAT_EQ(look_of(pack, "redstone_torch", {{"lit", "true"}}).emission, 7.0F / 15.0F);
+  EXPECT_FLOAT_EQ(look_of(pack, "redstone_torch").emission, 7.0F / 15.0F);
+  constexpr std::array kLevels{0, 3, 7, 11, 15};
+  for (int charges = 0; charges <= 4; ++charges) {
+    const VoxelProperties anchor = look_of(pack, "respawn_anchor", {{"charges", std::to_string(charges)}});
+    EXPECT_FLOAT_EQ(anchor.emission, static_cast<float>(kLevels[static_cast<std::size_t>(charges)]) / 15.0F) << charges;
+    EXPECT_FALSE(anchor.shapes.empty());
+  }
+}
+
+TEST(PackEmission, LaterPacksReplaceTheLightOfEarlierOnes) {
+  const auto again = [](const VoxelProperties& type, const char* light) {
+    return BlockLooks(pack_with_light(light).files()).applied(type);
+  };
+  VoxelProperties ore = look_of(pack_with_light("15"), "mod:ore");
+  EXPECT_EQ(ore.emission, 1.0F);
+  ore = again(ore, "6");
+  EXPECT_FLOAT_EQ(ore.emission, 6.0F / 15.0F);
+  EXPECT_EQ(shares_of_halves(ore), (std::array{255, 0}));
+  EXPECT_EQ(again(ore, "").emission, 0.0F);
+  EXPECT_EQ(again(look_of(pack_with_light("3"), "mod:glow_stone"), "").emission, 1.0F) << "a lamp by its name";
+  // Worlds of earlier versions have other levels.
+  VoxelProperties torch = block("torch").type;
+  torch.emission = 1.0F;
+  EXPECT_FLOAT_EQ(again(torch, "").emission, 14.0F / 15.0F);
+}
+
+// Only the visible texels of an overlay emit.
+TEST(PackEmission, OverlaysEmitByTheirVisibleShare) {
+  PackBuilder pack = pack_with_light("");
+  const auto shares = [&](const std::string& lower, const std::string& upper, const std::string& overlay) {
+    const auto box = [](const std::string& light, const std::string& texture) {
+      return R"({"from": [0, 0, 0], "to": [16, 16, 16], "light_emission": )" + light +
+             R"(, "faces": {"up": {"texture": "block/)" + texture + R"("}, "north": {"texture": "block/)" + texture +
+             "\"}}}";
+    };
+    pack.model("block/halves", R"({"elements": [)" + box(lower, "red") + ", " + box(upper, overlay) + "]}");
+    std::vector<int> found;
+    for (const SideOfShape& side : sides_of(look_of(pack, "mod:ore"))) found.push_back(side.look.emission_share);
+    return found;
+  };
+  pack.texture("block/quarter", packs_test::png(16, [](int x, int) {
+                 return x < 4 ? Rgba8{255, 255, 0} : Rgba8{0, 0, 0, 0};
+               }));
+  EXPECT_EQ(shares("0", "15", "quarter"), (std::vector<int>{64, 64}));
+  EXPECT_EQ(shares("15", "0", "quarter"), (std::vector<int>{191, 191}));
+  EXPECT_EQ(shares("15", "15", "quarter"), (std::vector<int>{255, 255}));
+  EXPECT_EQ(shares("0", "15", "red"), (std::vector<int>{255, 255})) << "an opaque overlay hides the face below";
 }
 
 }  // namespace

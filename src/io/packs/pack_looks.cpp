@@ -114,7 +114,8 @@ class BlockLooks::Maker {
         states_(std::move(source.states)),
         node_(std::move(source.node)),
         name_(without_space(states_.block())),
-        is_own_(looks.own_library_ && &library_ == &*looks.own_library_) {}
+        is_own_(looks.own_library_ && &library_ == &*looks.own_library_),
+        light_(light_without_packs(type_, states_)) {}
 
   /// Returns the type with its look; nullopt if the library has none. Errors: of files, with their path.
   Result<std::optional<VoxelProperties>> make() {
@@ -304,7 +305,8 @@ class BlockLooks::Maker {
     std::erase_if(outcomes_, [](const Outcome& each) { return each.model->elements().empty(); });
     for (const Outcome& outcome : outcomes_) {
       for (const PackElement& each : outcome.model->elements()) {
-        greatest_light_ = std::max(greatest_light_, each.light_emission);
+        has_element_light_ = has_element_light_ || each.light_emission > 0;
+        if (light_.may_meet(outcome.when)) greatest_light_ = std::max(greatest_light_, each.light_emission);
       }
     }
     return {};
@@ -422,15 +424,21 @@ class BlockLooks::Maker {
   /// Returns a model's elements with shares of emission; none if all faces have all of it. Packs that light up elements
   /// decide; else the rules for the block's name do.
   [[nodiscard]] std::vector<PackElement> lit_elements(const BlockModel& model) const {
-    if (greatest_light_ > 0) return with_light_emission(model.elements(), emission());
-    const EmittingFaces* const rule = type_.emission > 0.0F ? EmissionRules::instance().find(name_) : nullptr;
+    const float base = light_.emission;
+    if (!(emission() > 0.0F)) return {};
+    if (has_element_light_) return with_light_emission(model.elements(), base > 0.0F ? base : greatest_light());
+    const EmittingFaces* const rule = EmissionRules::instance().find(name_);
     return rule == nullptr ? std::vector<PackElement>() : with_emission(model, *rule);
   }
 
-  /// Returns the emission of the type with its look. Types that the game does not count as lights have the greatest
-  /// light of their elements.
+  [[nodiscard]] float greatest_light() const { return static_cast<float>(greatest_light_) / 15.0F; }
+
+  /// Returns the emission of the type with its look. Types without light have the greatest light of their elements;
+  /// those of the game only look lit.
   [[nodiscard]] float emission() const {
-    return type_.emission > 0.0F ? type_.emission : static_cast<float>(greatest_light_) / 15.0F;
+    constexpr float kUnlit = 0.9F / 30.0F;  // from 1 / 30, propagated light has level 1
+    if (light_.emission > 0.0F) return light_.emission;
+    return light_.is_of_game ? std::min(greatest_light(), kUnlit) : greatest_light();
   }
 
   /// Returns the orientation that remains after `elements`.
@@ -703,7 +711,9 @@ class BlockLooks::Maker {
   bool is_multipart_ = false;
   bool has_textures_ = false;
   std::vector<Outcome> outcomes_;
-  int greatest_light_ = 0;  // PackElement::light_emission of all models
+  BlockLight light_;
+  int greatest_light_ = 0;          // PackElement::light_emission of models that the type's states show
+  bool has_element_light_ = false;  // of any model
 };
 
 namespace {

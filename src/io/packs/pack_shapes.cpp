@@ -311,9 +311,7 @@ void put_face(const std::optional<FaceLayer>& layer, Direction direction, const 
     ElementFace& lower = earlier->faces[number_of(direction)];
     const bool is_blended = layer && lower.is_drawn && lower.face && !lower.face->texture.is_null();
     if (is_blended && layer->look.alpha != FaceAlpha::Opaque) {
-      FaceLayer both = textures.blended({*lower.face, *lower.part}, &*layer);
-      both.look.emission_share = std::max(lower.face->emission_share, emission_share);
-      set(lower, both);
+      set(lower, textures.blended({*lower.face, *lower.part}, &*layer));
       return;
     }
     if (lower.is_drawn) {

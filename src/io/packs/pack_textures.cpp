@@ -230,11 +230,14 @@ const PackTexture& TextureReader::plain(Rgba8 colour) {
 FaceLayer TextureReader::blended(const FaceLayer& lower, const FaceLayer* upper) {
   const std::string name = text_of_layer(lower) + (upper == nullptr ? "" : "+" + text_of_layer(*upper));
   FaceLayer result;
-  const auto use = [&](const PackTexture& made) {
-    result.look = {.texture = made.texture, .alpha = made.alpha};
+  const auto use = [&](const Blend& made) {
+    const float from = lower.look.emission_share;
+    const float to = upper == nullptr ? from : upper->look.emission_share;
+    const auto share = static_cast<std::uint8_t>(std::lround(from + (to - from) * made.upper_share));
+    result.look = {.texture = made.shown.texture, .alpha = made.shown.alpha, .emission_share = share};
     return result;
   };
-  if (const auto known = made_.find(name); known != made_.end()) return use(known->second);
+  if (const auto known = blends_.find(name); known != blends_.end()) return use(known->second);
   const auto [left, top, right_end, bottom] = lower.part;
   const float extent = std::max(std::abs(right_end - left), std::abs(bottom - top)) / 16.0F;
   const auto texels = static_cast<unsigned>(std::lround(extent * static_cast<float>(lower.look.texture.size())));
@@ -247,6 +250,8 @@ FaceLayer TextureReader::blended(const FaceLayer& lower, const FaceLayer* upper)
   }
   blended_texels_ = texels_of_all;
   AlphaImage image{size, size, {}};
+  double visible = 0.0;
+  double upper_visible = 0.0;
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
       const float right = (static_cast<float>(x) + 0.5F) / static_cast<float>(size);
@@ -255,6 +260,8 @@ FaceLayer TextureReader::blended(const FaceLayer& lower, const FaceLayer* upper)
       const auto above = upper == nullptr ? std::array<float, 4>{} : texel_of(*upper, right, down);
       const float alpha = above[3] + below[3] * (1.0F - above[3]);
       const float share = alpha > 0.0F ? above[3] / alpha : 0.0F;
+      visible += alpha;
+      upper_visible += above[3];
       const Rgba8 colour =
           srgb_colour({above[0] * share + below[0] * (1.0F - share), above[1] * share + below[1] * (1.0F - share),
                        above[2] * share + below[2] * (1.0F - share)});
@@ -264,7 +271,8 @@ FaceLayer TextureReader::blended(const FaceLayer& lower, const FaceLayer* upper)
   }
   auto made = texture_of(name, std::move(image));
   QUOIN_ASSERT(made, "a square image of the size of a texture");
-  return use(made_.emplace(name, std::move(*made)).first->second);
+  const auto share = static_cast<float>(visible > 0.0 ? upper_visible / visible : 0.0);
+  return use(blends_.emplace(name, Blend{std::move(*made), share}).first->second);
 }
 
 }  // namespace quoin::packs

@@ -79,8 +79,9 @@ class TextureReader {
   /// Returns a texture of one opaque colour.
   [[nodiscard]] const PackTexture& plain(Rgba8 colour);
   /// Returns the layer that shows both: `upper` with its alpha over `lower`; or only `lower` if it is null. Its tint is
-  /// white and its texture shows a whole face, with turn 0. Returns `lower` if all such textures would have more than
-  /// `max_blended_texels`; see `refused_blends`.
+  /// white and its texture shows a whole face, with turn 0. Its share of emission is the mean of both, weighted by their
+  /// visible texels. Returns `lower` if all such textures would have more than `max_blended_texels`; see
+  /// `refused_blends`.
   [[nodiscard]] FaceLayer blended(const FaceLayer& lower, const FaceLayer* upper);
   /// Returns the number of calls of `blended` that made no texture because of the limit.
   [[nodiscard]] std::size_t refused_blends() const { return refused_blends_; }
@@ -90,6 +91,11 @@ class TextureReader {
   std::size_t max_blended_texels_;
   std::map<std::string, Known> known_;
   std::map<std::string, PackTexture> made_;
+  struct Blend {
+    PackTexture shown;
+    float upper_share = 0.0F;  // of the upper layer among the visible texels, 0 to 1
+  };
+  std::map<std::string, Blend> blends_;
   std::size_t blended_texels_ = 0;
   std::size_t refused_blends_ = 0;
 };

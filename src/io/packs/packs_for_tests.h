@@ -58,7 +58,11 @@ class PackBuilder {
     put("blockstates/" + std::string(name) + ".json", std::move(json));
   }
   void put(std::string_view path, std::string content) {
-    pack_->put("assets/minecraft/" + std::string(path), std::move(content));
+    put_asset("minecraft/" + std::string(path), std::move(content));
+  }
+  /// `path`: below "assets", such as "mod/blockstates/lamp.json".
+  void put_asset(std::string_view path, std::string content) {
+    pack_->put("assets/" + std::string(path), std::move(content));
   }
   [[nodiscard]] std::shared_ptr<const packs::PackFiles> files() const { return pack_; }
 

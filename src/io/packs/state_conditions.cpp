@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 #include <set>
 #include <string>
@@ -9,6 +10,9 @@
 #include <utility>
 
 #include <quoin/core/assert.h>
+
+#include "io/luanti/luanti.h"
+#include "io/minecraft/block_looks.h"
 
 namespace quoin::packs {
 
@@ -105,6 +109,46 @@ bool TypeStates::holds_for_absent(const StateTerm& term) const {
   if (common.empty() || side_of(term.property) != nullptr) common.insert(common.end(), {"false", "0"});
   const auto is_met = [&](std::string_view value) { return contains_value(term, value); };
   return term.is_negated ? std::ranges::all_of(common, is_met) : std::ranges::any_of(common, is_met);
+}
+
+std::map<int, std::vector<ShapeCondition>> TypeStates::light_levels() const {
+  std::map<int, std::vector<ShapeCondition>> levels;
+  struct State {
+    std::vector<std::pair<std::string, std::string>> properties;
+    ShapeCondition when;
+  };
+  std::vector<State> states{{named_, {}}};
+  for (const std::string_view key : minecraft::light_properties_of_block(block_)) {
+    const minecraft::StateField* const of_key = field(key);
+    if (of_key == nullptr) {
+      // Names of types leave lit=false out, which unlit redstone torches have.
+      const std::size_t count = key == "lit" && !has(key) ? states.size() : 0;
+      for (std::size_t i = 0; i < count; ++i) {
+        State unlit = states[i];
+        unlit.properties.emplace_back(key, "false");
+        states.push_back(std::move(unlit));
+      }
+      continue;
+    }
+    std::vector<State> longer;
+    // Words and numbers have codes below 32.
+    const std::uint32_t codes = std::uint32_t{1} << std::min(of_key->bits, 5);
+    for (const State& state : states) {
+      for (std::uint32_t code = 0; code < codes; ++code) {
+        State& made = longer.emplace_back(state);
+        made.properties.emplace_back(key, minecraft::value_of_code(*of_key, code));
+        made.when.state_mask |= mask_of(*of_key);
+        made.when.state |= code << of_key->first_bit;
+      }
+    }
+    states = std::move(longer);
+  }
+  for (const State& state : states) {
+    if (const auto level = minecraft::light_level_of_block(block_, state.properties)) {
+      levels[*level].push_back(state.when);
+    }
+  }
+  return levels;
 }
 
 std::vector<ShapeCondition> TypeStates::with_corners(const std::vector<ShapeCondition>& all, const StateTerm& term) {
@@ -258,6 +302,31 @@ Result<std::vector<ShapeCondition>> conditions_without(std::vector<ShapeConditio
     if (all.empty()) break;
   }
   return all;
+}
+
+bool BlockLight::may_meet(const std::vector<ShapeCondition>& conditions) const {
+  const auto agree = [](const ShapeCondition& a, const ShapeCondition& b) {
+    return ((a.state ^ b.state) & a.state_mask & b.state_mask) == 0;
+  };
+  return when.empty() || std::ranges::any_of(conditions, [&](const ShapeCondition& a) {
+           return std::ranges::any_of(when, [&](const ShapeCondition& b) { return agree(a, b); });
+         });
+}
+
+BlockLight light_without_packs(const VoxelProperties& type, const TypeStates& states) {
+  if (!type.attributes.contains(minecraft::kStatesAttribute)) {
+    const auto node = models::node_properties(type.name);
+    return {.emission = node ? node->emission : 0.0F};
+  }
+  const auto levels = states.light_levels();
+  const std::string& block = states.block();
+  if (levels.empty()) {
+    const bool is_of_game = block.starts_with("minecraft:") || block.find(':') == std::string::npos;
+    return {minecraft::look_of_block(block, states.is_named("lit", "true"), false).emission, is_of_game};
+  }
+  const auto nearest = std::ranges::min_element(
+      levels, {}, [&](const auto& each) { return std::abs(static_cast<float>(each.first) - 15.0F * type.emission); });
+  return {static_cast<float>(nearest->first) / 15.0F, true, nearest->second};
 }
 
 }  // namespace quoin::packs

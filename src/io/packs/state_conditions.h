@@ -59,6 +59,10 @@ class TypeStates {
   /// fields facing and half, next to each other.
   [[nodiscard]] bool has_corners() const { return has_corners_; }
 
+  /// Returns the light levels of the type's states in the game (minecraft::light_level_of_block), each with the
+  /// conditions of the states that have it; none for blocks that are not listed.
+  [[nodiscard]] std::map<int, std::vector<ShapeCondition>> light_levels() const;
+
  private:
   [[nodiscard]] static std::vector<ShapeCondition> with_corners(const std::vector<ShapeCondition>& all,
                                                                 const StateTerm& term);
@@ -87,5 +91,20 @@ class TypeStates {
 [[nodiscard]] inline std::uint32_t mask_of(const minecraft::StateField& field) {
   return static_cast<std::uint32_t>(((std::uint64_t{1} << field.bits) - 1U) << field.first_bit);
 }
+
+/// The light of a type without packs.
+struct BlockLight {
+  float emission = 0.0F;               ///< as in VoxelProperties
+  bool is_of_game = false;             ///< the block is one of the game's, also if it is dark
+  std::vector<ShapeCondition> when{};  ///< one of these holds in the states with this light; empty: all states
+
+  /// Returns true if a state with this light may meet one of the conditions.
+  [[nodiscard]] bool may_meet(const std::vector<ShapeCondition>& conditions) const;
+};
+
+/// Finds the light by the name of a type, since an earlier pack may have set its emission. Where the light level depends
+/// on state bits, each level is a type of its own; the result is then the level that is nearest to the type's emission,
+/// as packs do not change it. `states` has the name of the block that gives the type its look.
+[[nodiscard]] BlockLight light_without_packs(const VoxelProperties& type, const TypeStates& states);
 
 }  // namespace quoin::packs
