@@ -173,8 +173,9 @@ class ShapesAtVoxel {
 // light. Cutout sides count by their visible texels. Requires: the type has shapes.
 [[nodiscard]] Vec3 mean_of_shapes(const VoxelProperties& type);
 
-// Returns the mean share of a type's emission that these sides have (VoxelFace::emission_share), 0 to 1, with the same
-// weights. Requires: the type has shapes.
+// Returns the mean share of a type's emission that these sides have (VoxelFace::emission_share), 0 to 1, by their areas
+// and shares of positions. Cutout sides count by the visible texels of the part of their texture that they show. Where
+// shares differ, this reads texels. Requires: the type has shapes.
 [[nodiscard]] float emission_share_of_shapes(const VoxelProperties& type);
 
 // Returns the colour that a type's shapes emit, as a multiple of the type's emission: the mean of the emitting sides,

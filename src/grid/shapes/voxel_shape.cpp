@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <ranges>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -278,9 +279,16 @@ Vec3 coverage_of(const ShapeModel& model, const VoxelFaces& type_faces) {
 
 namespace {
 
-// Calls `visit` for each drawn side of all shapes of a type, with its look, null if it has the type's colour, and its
-// weight: the visible area, by the share of positions.
-void for_each_side(const VoxelProperties& type, FunctionRef<void(const VoxelFace* look, float weight)> visit) {
+// A drawn side of a type's shapes.
+struct DrawnSide {
+  const ShapeElement& element;
+  Direction direction = Direction::PosX;
+  const VoxelFace* look = nullptr;  // null: the type's colour
+  float area = 0.0F;                // times the share of positions
+};
+
+// Calls `visit` for each drawn side of all shapes of a type.
+void for_each_side(const VoxelProperties& type, FunctionRef<void(const DrawnSide& side)> visit) {
   const auto add_element = [&](const ShapeElement& element, float number) {
     const Vec3 size = element.max - element.min;
     for (const Direction side : kDirections) {
@@ -288,7 +296,7 @@ void for_each_side(const VoxelProperties& type, FunctionRef<void(const VoxelFace
       if (!face.is_drawn) continue;
       const VoxelFace* const look = face.face ? &*face.face : type.faces.empty() ? nullptr : &type.faces[side];
       const FaceFrame& frame = frame_of(side);
-      visit(look, number * size[frame.u] * size[frame.v] * visible_share(look));
+      visit({element, side, look, number * size[frame.u] * size[frame.v]});
     }
   };
   const ShapeRules& rules = type.shapes.rules();
@@ -301,13 +309,73 @@ void for_each_side(const VoxelProperties& type, FunctionRef<void(const VoxelFace
   }
 }
 
-}  // namespace
-
-namespace {
-
 Vec3 mean_colour_of_side(const VoxelProperties& type, const VoxelFace* look) {
   const Vec3 colour = linear_colour(look == nullptr ? type.colour : look->tint);
   return look == nullptr || look->texture.is_null() ? colour : colour * look->texture.mean();
+}
+
+float emission_factor_of(const DrawnSide& side) {
+  return side.look == nullptr ? 1.0F : emission_factor(*side.look);
+}
+
+// Returns the part of its texture that a side shows: left, top, right, bottom, from 0 to 1 at the texture's edges.
+// Requires: the side has a texture.
+std::array<float, 4> part_of(const DrawnSide& side) {
+  constexpr auto kUnits = static_cast<float>(kShapeUnits);
+  if (const auto& part = side.element.faces[static_cast<std::size_t>(side.direction)].part) {
+    return {(*part)[0] / kUnits, (*part)[1] / kUnits, (*part)[2] / kUnits, (*part)[3] / kUnits};
+  }
+  const TextureFrame frame = texture_frame(*side.look, side.direction);
+  const auto along = [&](const IVec3& axis, const Vec3& corner) {
+    const int i = axis.x != 0 ? 0 : axis.y != 0 ? 1 : 2;
+    return axis[i] > 0 ? corner[i] / kUnits : 1.0F - corner[i] / kUnits;
+  };
+  const Vec3& a = side.element.min;
+  const Vec3& b = side.element.max;
+  return {along(frame.right, a), along(frame.down, a), along(frame.right, b), along(frame.down, b)};
+}
+
+// The texels that a side shows.
+struct SeenTexels {
+  float coverage = 1.0F;  // the visible share; 1 unless the side is cutout
+  Vec3 mean{1.0F};        // linear, without the tint, weighted by alpha
+};
+
+SeenTexels seen_texels(const DrawnSide& side) {
+  if (side.look == nullptr || side.look->texture.is_null()) return {};
+  const Texture& texture = side.look->texture;
+  const bool is_cutout = side.look->alpha == FaceAlpha::Cutout;
+  const std::array<float, 4> part = part_of(side);
+  SeenTexels seen{is_cutout ? texture.coverage() : 1.0F, texture.mean()};
+  const auto is_whole = [](float a, float b) { return std::min(a, b) == 0.0F && std::max(a, b) == 1.0F; };
+  if (is_whole(part[0], part[2]) && is_whole(part[1], part[3])) return seen;
+  // A sample per texel, but at most 64 per axis.
+  const int size = texture.size();
+  const auto count = [&](float extent) {
+    return std::clamp(static_cast<int>(std::ceil(std::abs(extent) * static_cast<float>(size) - 1e-3F)), 1, 64);
+  };
+  const int columns = count(part[2] - part[0]);
+  const int rows = count(part[3] - part[1]);
+  const auto number = [&](float from, float to, int i, int samples) {
+    const float at = from + (to - from) * (static_cast<float>(i) + 0.5F) / static_cast<float>(samples);
+    return static_cast<std::size_t>(std::clamp(at * static_cast<float>(size), 0.0F, static_cast<float>(size - 1)));
+  };
+  const std::span<const Rgba8> texels = texture.level(0);
+  Vec3 sum(0.0F);
+  float weights = 0.0F;
+  for (int y = 0; y < rows; ++y) {
+    const std::size_t row = number(part[1], part[3], y, rows);
+    for (int x = 0; x < columns; ++x) {
+      const std::size_t column = number(part[0], part[2], x, columns);
+      const Rgba8 texel = texels[row * static_cast<std::size_t>(size) + column];
+      const float weight = is_cutout ? (texel.a >= kCutoutAlpha ? 1.0F : 0.0F) : static_cast<float>(texel.a) / 255.0F;
+      sum += weight * linear_colour(texel);
+      weights += weight;
+    }
+  }
+  if (is_cutout) seen.coverage = weights / static_cast<float>(columns * rows);
+  if (weights > 0.0F) seen.mean = sum / weights;
+  return seen;
 }
 
 }  // namespace
@@ -315,18 +383,25 @@ Vec3 mean_colour_of_side(const VoxelProperties& type, const VoxelFace* look) {
 Vec3 mean_of_shapes(const VoxelProperties& type) {
   Vec3 sum(0.0F);
   float total = 0.0F;
-  for_each_side(type, [&](const VoxelFace* look, float weight) {
-    sum += weight * mean_colour_of_side(type, look);
+  for_each_side(type, [&](const DrawnSide& side) {
+    const float weight = side.area * visible_share(side.look);
+    sum += weight * mean_colour_of_side(type, side.look);
     total += weight;
   });
   return total > 0.0F ? sum / total : linear_colour(type.colour);
 }
 
 float emission_share_of_shapes(const VoxelProperties& type) {
+  // Texels are read only where shares differ.
+  bool has_shares = false;
+  for_each_side(type, [&](const DrawnSide& side) { has_shares = has_shares || emission_factor_of(side) < 1.0F; });
+  if (!has_shares) return 1.0F;
   float sum = 0.0F;
   float total = 0.0F;
-  for_each_side(type, [&](const VoxelFace* look, float weight) {
-    sum += look == nullptr ? weight : weight * emission_factor(*look);
+  for_each_side(type, [&](const DrawnSide& side) {
+    const bool is_cutout = side.look != nullptr && side.look->alpha == FaceAlpha::Cutout;
+    const float weight = is_cutout ? side.area * seen_texels(side).coverage : side.area;
+    sum += weight * emission_factor_of(side);
     total += weight;
   });
   return total > 0.0F ? sum / total : 1.0F;
@@ -336,9 +411,13 @@ Vec3 glow_of_shapes(const VoxelProperties& type) {
   Vec3 sum(0.0F);
   float total = 0.0F;
   float greatest = 0.0F;
-  for_each_side(type, [&](const VoxelFace* look, float weight) {
-    const float share = look == nullptr ? 1.0F : emission_factor(*look);
-    sum += weight * share * mean_colour_of_side(type, look);
+  for_each_side(type, [&](const DrawnSide& side) {
+    const float share = emission_factor_of(side);
+    if (!(share > 0.0F)) return;
+    const SeenTexels seen = seen_texels(side);
+    const float weight = side.area * seen.coverage;
+    const Vec3 colour = linear_colour(side.look == nullptr ? type.colour : side.look->tint) * seen.mean;
+    sum += weight * share * colour;
     total += weight * share;
     greatest = std::max(greatest, weight > 0.0F ? share : 0.0F);
   });

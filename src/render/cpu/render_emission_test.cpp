@@ -108,6 +108,42 @@ TEST(FaceEmission, HalvedShapesHaveMeanOfAreas) {
   EXPECT_EQ(emission_share_of_shapes(dark), 0.0F);
 }
 
+// A torch of two plates with a whole texture, cut below its flame: two texels wide, 8 of the stick and 2 of the flame.
+VoxelProperties cut_torch(bool has_parts) {
+  AlphaImage image{16, 16, {}};
+  for (int y = 0; y < 16; ++y) {
+    for (int x = 0; x < 16; ++x) {
+      const bool is_visible = (x == 7 || x == 8) && y >= 6;
+      const Rgba8 colour = y < 8 ? Rgba8{255, 220, 120} : Rgba8{90, 60, 30};
+      const auto alpha = static_cast<std::uint8_t>(is_visible ? 255 : 0);
+      image.rgba.insert(image.rgba.end(), {colour.r, colour.g, colour.b, alpha});
+    }
+  }
+  const Texture texture = Texture::from_image("torch", image).value();
+  std::vector<ShapeElement> elements{{.min = {0, 0, 7}, .max = {16, 8, 7}}, {.min = {0, 8, 7}, .max = {16, 16, 7}}};
+  for (std::size_t i = 0; i < 2; ++i) {
+    for (const Direction direction : kDirections) {
+      ElementFace& face = elements[i].faces[static_cast<std::size_t>(direction)];
+      face.is_drawn = frame_of(direction).axis == 2;
+      const auto share = static_cast<std::uint8_t>(i == 0 ? 0 : 255);
+      face.face = VoxelFace{.texture = texture, .alpha = FaceAlpha::Cutout, .emission_share = share};
+      if (has_parts) face.part = i == 0 ? std::array{16.0F, 8.0F, 0.0F, 16.0F} : std::array{0.0F, 8.0F, 16.0F, 0.0F};
+    }
+  }
+  VoxelProperties torch{.name = "torch", .emission = 1.0F};
+  torch.shapes = *VoxelShape::from_elements(elements);
+  return torch;
+}
+
+TEST(FaceEmission, SidesCountByTheTexelsThatTheyShow) {
+  for (const bool has_parts : {false, true}) {
+    const VoxelProperties torch = cut_torch(has_parts);
+    EXPECT_NEAR(emission_share_of_shapes(torch), 0.2F, 1e-5F) << has_parts;
+    const Vec3 glow = glow_of_shapes(torch);
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(glow[i], linear({255, 220, 120})[i], 1e-5F) << has_parts;
+  }
+}
+
 std::array<Vec3, 6> power_of(const Grid& grid, const VoxelRegistry& types, EmissiveCells& cells) {
   cells.update(grid, types);
   std::array<Vec3, 6> power{};
