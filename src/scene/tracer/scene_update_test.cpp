@@ -346,6 +346,32 @@ TEST(TreeCache, SharesTheTreeOfPlainGlass) {
   EXPECT_EQ(trees.face_cells(), nullptr);
 }
 
+// The first update only knows cubes, so it does not look at shapes.
+TEST(TreeCache, AddsShapesNextToGlassThatItKnows) {
+  VoxelRegistry types;
+  const VoxelType glass = *types.add({.name = "glass", .visibility = Visibility::Transparent});
+  VoxelProperties of_pane{.name = "pane", .visibility = Visibility::Transparent};
+  of_pane.shapes = *VoxelShape::from_elements({{.min = {4, 4, 4}, .max = {8, 8, 8}}});
+  const VoxelType pane = *types.add(of_pane);
+  for (const ShapedVoxels shaped : {ShapedVoxels::AsCubes, ShapedVoxels::ByShape, ShapedVoxels::ForSight}) {
+    Grid grid;
+    grid.set({1, 2, 3}, glass);
+    TreeCache trees(shaped);
+    trees.update(grid, types);
+    ASSERT_TRUE(trees.transparent()->is_occupied({1, 2, 3}));
+    grid.set({5, 5, 5}, pane);
+    EXPECT_TRUE(trees.update(grid, types));
+    EXPECT_TRUE(trees.transparent()->is_occupied({1, 2, 3}));
+    const bool is_cube = shaped == ShapedVoxels::AsCubes;
+    EXPECT_EQ(trees.transparent()->is_occupied({5, 5, 5}), is_cube);
+    EXPECT_EQ(trees.shapes() == nullptr, is_cube);
+    if (shaped != ShapedVoxels::ForSight) continue;
+    ASSERT_NE(trees.glass_voxels(), nullptr);
+    EXPECT_TRUE(trees.glass_voxels()->is_occupied({1, 2, 3}));
+    EXPECT_TRUE(trees.glass_voxels()->is_occupied({5, 5, 5}));
+  }
+}
+
 TEST(TreeCache, RecoversFromFailedUpdatesOfTreesForImages) {
   int failures = 0;
   for (int n = 0; n == failures; ++n) {

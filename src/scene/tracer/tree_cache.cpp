@@ -407,7 +407,7 @@ void TreeCache::update_split(const DensityGrid& field, const VoxelRegistry& type
 void TreeCache::update_transparent(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) {
   if (!transparent_) {
     if (!types.has_transparent()) return;
-    const bool has_cubes_only = shaped_ == ShapedVoxels::ByShape;
+    const bool has_cubes_only = shaped_ != ShapedVoxels::AsCubes;
     const auto counts = [&](VoxelType type) {
       return types.is_transparent(type) && !(has_cubes_only && types.is_shaped(type));
     };
