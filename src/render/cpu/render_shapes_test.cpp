@@ -305,6 +305,46 @@ TEST(RenderShapes, GlassCubesAsShapesGiveTheSamePixels) {
   }
 }
 
+// Panes that reach into glass on both sides of them, and glass that goes on below.
+TEST(RenderShapes, PanesInGlassDoNotSplitIt) {
+  for (const bool has_texture : {false, true}) {
+    Scene scene;
+    VoxelProperties of_glass{
+        .name = "glass", .colour = {200, 220, 230, 40}, .visibility = Visibility::Transparent, .ior = 1.5F};
+    AlphaImage image{16, 16, std::vector<std::uint8_t>(1'024, 40)};
+    const Texture grey = Texture::from_image("grey", image).value();
+    if (has_texture) of_glass.faces = VoxelFace{.texture = grey, .alpha = FaceAlpha::Translucent};
+    const VoxelType glass = *scene.types.add(of_glass);
+    VoxelProperties of_pane{.name = "pane", .colour = {90, 200, 90, 90}, .visibility = Visibility::Transparent};
+    of_pane.shapes = *VoxelShape::from_elements({{.min = {-16, 4, 4}, .max = {32, 8, 8}}});
+    const VoxelType pane = *scene.types.add(of_pane);
+    Grid grid;
+    grid.fill_box({{0, 0, 0}, {8, 1, 1}}, glass);
+    grid.set({8, 0, 0}, pane);
+    grid.fill_box({{9, 0, 0}, {16, 1, 1}}, glass);
+    place(scene, std::move(grid));
+    const SceneTracer tracer(scene);
+    const SceneView view(tracer, DVec3(0.0));
+    for (const double sign : {1.0, -1.0}) {
+      SeenThrough seen;
+      find_transparent(view, Surfaces(scene.types), {{8.5 - 12.5 * sign, 0.3, 0.3}, {sign, 0.0, 0.0}}, 100.0, seen);
+      ASSERT_EQ(seen.bodies.size(), 3U) << has_texture << " " << sign;
+      const std::array<VoxelType, 3> types = {glass, pane, glass};
+      const std::array<double, 3> begins = sign > 0.0 ? std::array{4.0, 11.0, 13.0} : std::array{5.0, 11.0, 13.0};
+      const std::array<double, 3> lengths = sign > 0.0 ? std::array{8.0, 3.0, 7.0} : std::array{7.0, 3.0, 8.0};
+      for (std::size_t i = 0; i < 3; ++i) {
+        const GlassBody& body = seen.bodies[i];
+        EXPECT_EQ(body.type, types.at(i));
+        EXPECT_NEAR(body.t_enter, begins.at(i), 1e-9);
+        EXPECT_NEAR(body.t_exit, begins.at(i) + lengths.at(i), 1e-9);
+        EXPECT_NEAR(body.voxels, lengths.at(i), 1e-9);
+        EXPECT_EQ(body.is_textured, has_texture && body.type == glass);
+        EXPECT_EQ(body.exit_in_shape, body.type == pane);
+      }
+    }
+  }
+}
+
 // A pool of two types of water, with fences in it.
 struct Pool {
   Scene scene;

@@ -2,8 +2,10 @@
 #include "scene/tracer/placed_grid.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 #include <glm/geometric.hpp>
 
@@ -100,6 +102,15 @@ class BodiesOfGrid {
   }
 
  private:
+  enum class Part : std::uint8_t { Cubes, Shapes };
+  static constexpr std::size_t kNoBody = std::numeric_limits<std::size_t>::max();
+  // The body of the list that last got a part.
+  struct LastBody {
+    std::size_t index = kNoBody;
+    float log_clarity = 0.0F;  // per voxel
+  };
+  [[nodiscard]] LastBody& last(Part part) { return last_[static_cast<std::size_t>(part)]; }
+
   // Flat, as the only loop of its kind would be: with two loops GCC no longer inlines the walk (3 % of an image).
   __attribute__((flatten)) void add_plain_glass() {
     begin();
@@ -108,7 +119,7 @@ class BodiesOfGrid {
     const auto largest = [&] { return largest_block(surfaces_[type].log_clarity); };
     const auto enter = [&](const trace::WalkSpan& begun) { type = voxels_of.get(begun.voxel); };
     trace::visit_blocks(*placed_.glass_voxels, ray_, max_t_, enter, largest, [&](const trace::WalkSpan& span) {
-      return add_span(span, type, surfaces_[type].log_clarity, nullptr);
+      return add_span(span, type, surfaces_[type].log_clarity, nullptr, back_reached(type, span.t_enter));
     });
   }
 
@@ -142,12 +153,16 @@ class BodiesOfGrid {
       enter(begun);
       walk.leave_block(size, largest);
     };
+    const auto add_cubes = [&](const trace::WalkSpan& span) {
+      GlassBody* const body = body_reached(Part::Cubes, type, span.t_enter);
+      return add_span(span, type, log_clarity, is_textured ? &texel : nullptr, body);
+    };
     visit_spans(*placed_.glass_voxels, first, leave, [&](const trace::WalkSpan& span) {
-      if (here.empty()) return add_span(span, type, log_clarity, is_textured ? &texel : nullptr);
+      if (here.empty()) return add_cubes(span);
       if (!straight) straight.emplace(ray_.origin, ray_.direction);
       if (!here.has_own() && is_glass_cube(voxels_of.get(span.voxel), span.voxel)) {
         enter(span);
-        if (!add_span(span, type, log_clarity, is_textured ? &texel : nullptr)) return false;
+        if (!add_cubes(span)) return false;
       }
       return add_shapes(here, span, *straight);
     });
@@ -188,9 +203,9 @@ class BodiesOfGrid {
   // ray began inside.
   [[nodiscard]] bool enter_textured(const TypeFaces& faces, VoxelType type, const trace::WalkSpan& begun, Rgba8& texel,
                                     float& log_clarity) {
-    if (out_.size() > first_ && continues(surfaces_, out_.back(), type, begun.t_enter)) {
-      log_clarity = log_clarity_;
-      return out_.back().is_textured;
+    if (const GlassBody* const body = body_reached(Part::Cubes, type, begun.t_enter)) {
+      log_clarity = last(Part::Cubes).log_clarity;
+      return body->is_textured;
     }
     if (begun.starts_inside) return false;
     const FaceTexels& side = faces.sides[static_cast<std::size_t>(begun.face)];
@@ -202,15 +217,15 @@ class BodiesOfGrid {
     return {span.voxel, span.behind, span.face, span.exit_face, span.starts_inside, span.t_enter, span.t_exit};
   }
 
-  // Adds a span to the last body, or as a new one with a texel, if there is one. Returns false if nothing behind it is
-  // visible.
-  bool add_span(const trace::WalkSpan& span, VoxelType type, float log_clarity, const Rgba8* texel) {
+  // Adds a span to a body, or if that is null as a new one with a texel, if there is one. Returns false if nothing
+  // behind it is visible.
+  bool add_span(const trace::WalkSpan& span, VoxelType type, float log_clarity, const Rgba8* texel, GlassBody* body) {
     const double t_exit = std::min(span.t_exit, max_t_);
     const double voxels = voxels_between(span.t_enter, t_exit);
     if (!(voxels > 0.0)) return true;  // an edge that it only touches
-    if (out_.size() > first_ && continues(surfaces_, out_.back(), type, span.t_enter)) {
+    if (body != nullptr) {
       // Most water voxels are inside the water.
-      lengthen(t_exit, span.exit_face, voxels);
+      lengthen(*body, t_exit, span.exit_face, voxels);
     } else {
       GlassBody& next = out_.emplace_back();  // filled in place
       fill_in(next, span.voxel, type, span.t_enter, t_exit);
@@ -218,7 +233,7 @@ class BodiesOfGrid {
       next.voxels = voxels;
       next.face = span.face;
       next.exit_face = span.exit_face;
-      log_clarity_ = log_clarity;
+      last(Part::Cubes) = {out_.size() - 1, log_clarity};
       if (texel != nullptr) {
         next.is_textured = true;
         next.texel = *texel;
@@ -230,6 +245,26 @@ class BodiesOfGrid {
   void begin() {
     first_ = out_.size();
     clarity_ = 0.0;
+    last_ = {};
+  }
+
+  // Returns the newest body if content of a type that begins at `t_enter` continues it; else null.
+  [[nodiscard]] GlassBody* back_reached(VoxelType type, double t_enter) {
+    return out_.size() > first_ && continues(surfaces_, out_.back(), type, t_enter) ? &out_.back() : nullptr;
+  }
+
+  // As above. Content also continues the last body that got content of its own kind: a pane that reaches into a cube of
+  // glass splits neither.
+  [[nodiscard]] GlassBody* body_reached(Part part, VoxelType type, double t_enter) {
+    LastBody& own = last(part);
+    if (GlassBody* const back = back_reached(type, t_enter)) {
+      if (own.index != out_.size() - 1) own = last(part == Part::Cubes ? Part::Shapes : Part::Cubes);
+      QUOIN_ASSERT(own.index == out_.size() - 1, "the newest body has cubes or shapes");
+      return back;
+    }
+    if (own.index == kNoBody) return nullptr;
+    GlassBody& body = out_[own.index];
+    return continues(surfaces_, body, type, t_enter) ? &body : nullptr;
   }
 
   // Uses blocks only if the body does not close along their diagonal; it then closes at the same voxel as voxel by
@@ -250,8 +285,7 @@ class BodiesOfGrid {
     return (t_exit - t_enter) * length_ / placed_.voxel_size * voxels_per_cell_;
   }
 
-  void lengthen(double t_exit, Direction exit_face, double voxels) {
-    GlassBody& body = out_.back();
+  static void lengthen(GlassBody& body, double t_exit, Direction exit_face, double voxels) {
     body.exit_in_shape = false;
     body.t_exit = t_exit;
     body.exit_face = exit_face;
@@ -282,9 +316,9 @@ class BodiesOfGrid {
   // Return false if nothing behind the body, or part, is visible.
   bool add(const GlassBody& next) {
     if (!(next.voxels > 0.0)) return true;  // an edge that it only touches
-    if (out_.size() > first_ && continues(surfaces_, out_.back(), next.type, next.t_enter)) {
-      if (next.t_exit <= out_.back().t_exit) return true;
-      lengthen(next.t_exit, next.exit_face, next.voxels);
+    if (GlassBody* const body = back_reached(next.type, next.t_enter)) {
+      if (next.t_exit <= body->t_exit) return true;
+      lengthen(*body, next.t_exit, next.exit_face, next.voxels);
     } else {
       out_.push_back(next);
     }
@@ -293,19 +327,19 @@ class BodiesOfGrid {
   bool add(const ShapePart& part) {
     if (!(part.voxels > 0.0)) return true;  // an edge that it only touches
     const ShapeSpan& span = part.span;
-    if (out_.size() > first_ && continues(surfaces_, out_.back(), span.shape.type, part.t_enter)) {
-      GlassBody& body = out_.back();
-      if (part.t_exit <= body.t_exit) return true;  // within it: the same box in another cell, or crossing plates
-      lengthen(part.t_exit, direction_of(span, span.exit), part.voxels);
+    GlassBody* body = body_reached(Part::Shapes, span.shape.type, part.t_enter);
+    if (body != nullptr) {
+      if (part.t_exit <= body->t_exit) return true;  // within it: the same box in another cell, or crossing plates
+      lengthen(*body, part.t_exit, direction_of(span, span.exit), part.voxels);
     } else {
-      begin_body(part);
+      body = &begin_body(part);
     }
-    out_.back().exit_in_shape = true;
-    out_.back().exit_normal = span.normal(span.exit);
-    return is_seen_beyond(log_clarity_, part.voxels);
+    body->exit_in_shape = true;
+    body->exit_normal = span.normal(span.exit);
+    return is_seen_beyond(last(Part::Shapes).log_clarity, part.voxels);
   }
 
-  void begin_body(const ShapePart& part) {
+  GlassBody& begin_body(const ShapePart& part) {
     const ShapeSpan& span = part.span;
     GlassBody& body = out_.emplace_back();
     fill_in(body, span.shape.voxel, span.shape.type, part.t_enter, part.t_exit);
@@ -316,13 +350,14 @@ class BodiesOfGrid {
     body.normal = span.normal(span.enter);
     body.face = direction_of(span, span.enter);
     body.exit_face = direction_of(span, span.exit);
-    log_clarity_ = surfaces_[body.type].log_clarity;
-    if (part.look == nullptr) return;
+    last(Part::Shapes) = {out_.size() - 1, surfaces_[body.type].log_clarity};
+    if (part.look == nullptr) return body;
     const DVec3 point = ray_.origin + ray_.direction * span.enter.t - DVec3(body.voxel);
     body.is_textured = true;
     body.texel = shape_texel(body.model->faces[static_cast<std::size_t>(span.enter.face)], *part.look, point);
     body.look = part.look;
-    log_clarity_ = std::log(1.0F - alpha_of(body.texel));
+    last(Part::Shapes).log_clarity = std::log(1.0F - alpha_of(body.texel));
+    return body;
   }
 
   // Returns the direction nearest to the normal at an end.
@@ -344,7 +379,7 @@ class BodiesOfGrid {
   std::vector<ShapePart> parts_;  // in the cell that the ray is in
   std::size_t first_ = 0;
   double clarity_ = 0.0;
-  float log_clarity_ = 0.0F;  // of the last body, per voxel
+  std::array<LastBody, 2> last_{};  // by Part
 };
 
 // Sorts bodies along the ray and joins those of neighbouring grids that touch.
