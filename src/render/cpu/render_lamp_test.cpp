@@ -405,6 +405,34 @@ TEST(EmissiveCells, MatchRebuildAfterEdits) {
   }
 }
 
+// If all data may have changed, removed chunks are still examined, since their lamps are known.
+TEST(EmissiveCells, ExamineRemovedChunksIfAllDataChanged) {
+  VoxelRegistry types;
+  VoxelProperties turned{.name = "turned", .emission = 1.0F, .state_bits = 2};
+  turned.orientations = StateOrientations::about_y();
+  const VoxelType type = *types.add(turned);
+  Grid grid;
+  grid.set({5, 5, 5}, type);
+  grid.set({200, 5, 5}, type);
+  ChangeCursor cursor;
+  (void)grid.changes_since(cursor);
+  grid.set({5, 5, 5}, kAir);
+  const GridChanges changes = grid.changes_since(cursor);
+  const std::vector<IVec3> both{{0, 0, 0}, {3, 0, 0}};
+  DataChanges data;
+  data.all = true;
+  std::vector<IVec3> chunks = chunks_to_mesh(grid, changes);
+  EXPECT_EQ(chunks, (std::vector<IVec3>{{0, 0, 0}}));
+  add_turned(grid, types, data, chunks);
+  EXPECT_EQ(chunks, both);
+  chunks = chunks_to_mesh(grid, changes);
+  add_near_shapes(grid, changes, data, chunks);
+  EXPECT_EQ(chunks, both);
+  chunks = {};
+  add_near_shapes(grid, changes, {}, chunks);
+  EXPECT_EQ(chunks, (std::vector<IVec3>{{0, 0, 0}})) << "a change far from other chunks";
+}
+
 TEST(RenderLamps, AllowsAlternatingLampLimits) {
   Scene scene = floor_by_night();
   for (int i = 0; i < 6; ++i) {

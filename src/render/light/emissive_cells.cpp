@@ -225,13 +225,30 @@ bool has_emission_shares(const VoxelProperties& type) {
   return has_shares;
 }
 
+namespace {
+
+// Removed chunks that are listed already stay: their lamps must go.
+void add_all(const Grid& grid, std::vector<IVec3>& chunks) {
+  const std::vector<IVec3> all = grid.chunks();
+  chunks.insert(chunks.end(), all.begin(), all.end());
+}
+
+}  // namespace
+
 void add_turned(const Grid& grid, const VoxelRegistry& types, const DataChanges& data, std::vector<IVec3>& chunks) {
   if (!types.has_turned_by_state()) return;
-  if (data.all) {
-    chunks = grid.chunks();
-    return;
-  }
+  if (data.all) add_all(grid, chunks);
   for (const DataChange& change : data.items_unless_all()) chunks.push_back(change.chunk);
+  sort_and_unite(chunks);
+}
+
+void add_near_shapes(const Grid& grid, const GridChanges& changes, const DataChanges& data,
+                     std::vector<IVec3>& chunks) {
+  QUOIN_ASSERT(!changes.all, "changes that are listed");
+  if (data.all) add_all(grid, chunks);
+  const auto add = [&](const auto& change) { add_chunks_near(change.chunk, change.box, kShapeReach, chunks); };
+  for (const ChunkChange& change : changes.items_unless_all()) add(change);
+  for (const DataChange& change : data.items_unless_all()) add(change);
   sort_and_unite(chunks);
 }
 

@@ -25,7 +25,12 @@ namespace quoin {
 [[nodiscard]] bool has_emission_shares(const VoxelProperties& type);
 
 /// Appends the chunks whose cubes may be turned in another way after changes of the voxels' data, and sorts `chunks`.
+/// If all data may have changed, these are all chunks of the grid.
 void add_turned(const Grid& grid, const VoxelRegistry& types, const DataChanges& data, std::vector<IVec3>& chunks);
+
+/// Appends the chunks whose shapes may look different after changes: those within kShapeReach of one. Sorts `chunks`.
+/// Requires: `changes.all` is false.
+void add_near_shapes(const Grid& grid, const GridChanges& changes, const DataChanges& data, std::vector<IVec3>& chunks);
 
 /// Data about the light-emitting chunks of a grid or field, kept up to date with its edits.
 template <class Item>

@@ -430,12 +430,8 @@ std::shared_ptr<const PathLamps> PathLampCache::lamps(const Scene& scene, std::s
         return chunks;
       };
       const auto near_shapes = [&](const GridChanges& changes) {
-        if (changes.all || data.all) return grid.chunks();
         std::vector<IVec3> chunks = chunks_to_mesh(grid, changes);
-        const auto add = [&](const auto& change) { add_chunks_near(change.chunk, change.box, kShapeReach, chunks); };
-        for (const ChunkChange& change : changes.items_unless_all()) add(change);
-        for (const DataChange& change : data.items_unless_all()) add(change);
-        sort_and_unite(chunks);
+        if (!changes.all) add_near_shapes(grid, changes, data, chunks);
         return chunks;
       };
       of.quads.follow(grid, scene.types, chunks_of,
