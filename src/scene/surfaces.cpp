@@ -160,10 +160,14 @@ FaceTexels face_texels(const VoxelFace& face, Direction direction, float emissio
   return found;
 }
 
-bool is_lamp_side(const ModelFace& side, const VoxelFace* look, const VoxelProperties& type) {
+bool is_emitting_side(const ModelFace& side, const VoxelFace* look, const VoxelProperties& type) {
   if (side.is_inner || !(emission_of(type) > 0.0F) || (look != nullptr && look->emission_share == 0)) return false;
   const bool has_texels = look != nullptr && !look->texture.is_null();
-  if (type.visibility != Visibility::Opaque && (!has_texels || look->alpha == FaceAlpha::Translucent)) return false;
+  return type.visibility == Visibility::Opaque || (has_texels && look->alpha != FaceAlpha::Translucent);
+}
+
+bool is_lamp_side(const ModelFace& side, const VoxelFace* look, const VoxelProperties& type) {
+  if (!is_emitting_side(side, look, type)) return false;
   constexpr float kRounding = 1e-4F;
   const auto& at = side.corners;
   const Vec3 u = at[1] - at[0];

@@ -132,8 +132,10 @@ struct FaceTexels {
 /// Prepares a face. `emission`: of the type. Lifetime: that of its texture. Requires: the face has one.
 [[nodiscard]] FaceTexels face_texels(const VoxelFace& face, Direction direction, float emission);
 
-/// Returns true if path tracing samples a side of a shape as a lamp: it emits, rays end at it, and it is a visible
-/// rectangle. `look`: of the side (look_of).
+/// Returns true if a side of a shape emits, can be seen, and rays end at it. `look`: of the side (look_of).
+[[nodiscard]] bool is_emitting_side(const ModelFace& side, const VoxelFace* look, const VoxelProperties& type);
+
+/// Returns true if path tracing samples a side of a shape as a lamp: an emitting side that is a rectangle.
 [[nodiscard]] bool is_lamp_side(const ModelFace& side, const VoxelFace* look, const VoxelProperties& type);
 
 /// The textured faces of a type.

@@ -280,10 +280,15 @@ PathLamp lamp_of_quad(const Quad& quad, IVec3 chunk, const PlacedGrid& placed, V
   return lamp;
 }
 
-// Returns the mean light of the texels that a side shows; hidden ones give none.
-Vec3 mean_light(const ModelFace& side, const VoxelFace& look) {
+// The mean light of the texels that a side shows, where hidden ones give none, and the share that is visible.
+struct MeanLight {
+  Vec3 light{1.0F};
+  float visible = 1.0F;
+};
+
+MeanLight mean_light(const ModelFace& side, const VoxelFace& look) {
   const Vec3 tint = linear_colour(look.tint);
-  if (look.texture.is_null()) return tint;
+  if (look.texture.is_null()) return {tint, 1.0F};
   std::array<float, 2> low{1.0F, 1.0F};
   std::array<float, 2> high{0.0F, 0.0F};
   for (const std::array<float, 2>& corner : side.uv) {
@@ -310,15 +315,18 @@ Vec3 mean_light(const ModelFace& side, const VoxelFace& look) {
   };
   const std::span<const Rgba8> texels = look.texture.level(level);
   Vec3 sum(0.0F);
+  float visible = 0.0F;
   for (int y = first(1); y < end(1); ++y) {
     for (int x = first(0); x < end(0); ++x) {
       const Rgba8 texel =
           texels[static_cast<std::size_t>(y) * static_cast<std::size_t>(size) + static_cast<std::size_t>(x)];
       const float share = look.alpha == FaceAlpha::Opaque ? 1.0F : static_cast<float>(texel.a) / 255.0F;
       sum += linear_colour(texel) * share;
+      visible += share;
     }
   }
-  return sum * tint / static_cast<float>((end(0) - first(0)) * (end(1) - first(1)));
+  const auto count = static_cast<float>((end(0) - first(0)) * (end(1) - first(1)));
+  return {sum * tint / count, visible / count};
 }
 
 // The light of each side of a model that is a lamp; 0 for other sides.
@@ -328,7 +336,7 @@ struct SideLights {
 };
 
 // From afar, all together give the light of a voxel's six sides, as EmissiveCells do: a torch with a small flame lights
-// a room.
+// a room. Sides that are no rectangles are found by chance, without a boost, and count too.
 SideLights lights_of(const ShapeModel& model, const VoxelProperties& type) {
   constexpr float kSides = 6.0F;
   SideLights made{std::vector<Vec3>(model.faces.size(), Vec3(0.0F))};
@@ -337,10 +345,12 @@ SideLights lights_of(const ShapeModel& model, const VoxelProperties& type) {
   for (std::size_t i = 0; i < lights.size(); ++i) {
     const ModelFace& side = model.faces[i];
     const VoxelFace* const look = look_of(model, side, type.faces);
+    if (!is_emitting_side(side, look, type)) continue;
+    const MeanLight mean = look == nullptr ? MeanLight{linear_colour(type.colour)} : mean_light(side, *look);
+    const auto& at = side.corners;
+    area += 0.5F * glm::length(glm::cross(at[2] - at[0], at[3] - at[1])) * mean.visible;
     if (!is_lamp_side(side, look, type)) continue;
-    area += glm::length(side.corners[1] - side.corners[0]) * glm::length(side.corners[3] - side.corners[0]);
-    lights[i] = emission_of(type) *
-                (look == nullptr ? linear_colour(type.colour) : mean_light(side, *look) * emission_factor(*look));
+    lights[i] = mean.light * (emission_of(type) * (look == nullptr ? 1.0F : emission_factor(*look)));
   }
   if (area > 0.0F) made.far_boost = std::max(kSides / area - 1.0F, 0.0F);
   return made;

@@ -9,11 +9,14 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include <quoin/mesh/blocky.h>
 #include <quoin/render/path_tracer.h>
 
 #include "render/cpu/environment_for_tests.h"
 #include "render/cpu/render_test_support.h"
+#include "render/path/path_lamps.h"
 #include "render/path/town_for_tests.h"
+#include "scene/tracer/placed_grid.h"
 
 namespace quoin {
 namespace {
@@ -419,6 +422,70 @@ TEST(PathShapes, LightsUpAsCubes) {
   const double torch = light_of_floor(post_with_head(), false);
   EXPECT_GT(torch / as_cube, 0.5);
   EXPECT_LT(torch / as_cube, 2.0);
+}
+
+// Returns the light of all sides of shapes from afar, summed over their areas. Sides of `type` that are no lamps count
+// too, since paths meet them by chance.
+double far_light_of_shapes(const Scene& scene, VoxelType type) {
+  const SceneTracer tracer(scene);
+  path::PathLampCache cache;
+  const auto lamps = cache.lamps(scene, placed_in(tracer), Surfaces(scene.types), 1.0);
+  double light = 0.0;
+  for (const path::PathLamp& lamp : lamps->lamps()) {
+    EXPECT_TRUE(lamp.is_of_shape);
+    light += static_cast<double>(lamp.size_u * lamp.size_v * lamp.radiance.x * path::far_light(lamp, 1e6F));
+  }
+  BlockyMesher mesher;
+  QuadBuffer quads;
+  ShapeFaceBuffer sides;
+  const SceneGrid& grid = *scene.grids().find(scene.instances()[placed_in(tracer)[0].instance].grid);
+  mesher.mesh(grid.grid.neighbourhood({0, 0, 0}), scene.types, {.bake_occlusion = false}, quads, sides);
+  const VoxelProperties& properties = scene.types[type];
+  for (const ShapeFace& side : sides) {
+    const ModelFace& face = side.model_face();
+    if (side.type != type || is_lamp_side(face, look_of(*side.model, face, properties.faces), properties)) continue;
+    const auto& at = face.corners;
+    light += static_cast<double>(0.5F * glm::length(glm::cross(at[2] - at[0], at[3] - at[1])) * properties.emission);
+  }
+  return light;
+}
+
+// Two plates that show 4 of 256 texels.
+TEST(PathShapes, CutoutSidesLightUpAsCubes) {
+  const Texture flame = drawn([](int x, int y) {
+    const bool is_visible = x / 2 == 4 && y / 2 == 3;
+    return Rgba8{255, 255, 255, is_visible ? std::uint8_t{255} : std::uint8_t{0}};
+  });
+  std::vector<ShapeElement> elements{{.min = {7, 0, 0}, .max = {9, 16, 16}}};
+  for (ElementFace& face : elements[0].faces) face.is_drawn = false;
+  for (const Direction side : {Direction::NegX, Direction::PosX}) {
+    const VoxelFace look{.texture = flame, .alpha = FaceAlpha::Cutout};
+    elements[0].faces[static_cast<std::size_t>(side)] = {.face = look};
+  }
+  VoxelProperties torch{.name = "torch", .visibility = Visibility::Transparent, .emission = 0.5F};
+  torch.shapes = *VoxelShape::from_elements(elements);
+  Scene scene;
+  const VoxelType type = scene.types.add(torch).value();
+  Grid grid;
+  grid.set({5, 5, 5}, type);
+  place(scene, std::move(grid));
+  EXPECT_NEAR(far_light_of_shapes(scene, type), 6.0 * 0.5, 1e-4);
+}
+
+// Fluids that only touch at an edge, so that they show all sides: the top is two triangles, and some sides are no
+// rectangles.
+TEST(PathShapes, InclinedFluidsLightUpAsCubes) {
+  Scene scene;
+  VoxelProperties lava{.name = "lava", .colour = {255, 255, 255, 255}, .emission = 0.5F, .state_bits = 4};
+  lava.shapes = *VoxelShapes::from_rules({.neighbours = ShapeNeighbours::Fluid, .groups = 2});
+  const VoxelType type = scene.types.add(lava).value();
+  Grid grid;
+  grid.set({5, 5, 5}, type, {.state = 5});
+  grid.set({6, 5, 6}, type);
+  place(scene, std::move(grid));
+  const double light = far_light_of_shapes(scene, type);
+  EXPECT_GT(light, 0.8 * 2.0 * 6.0 * 0.5);
+  EXPECT_LT(light, 1.05 * 2.0 * 6.0 * 0.5);
 }
 
 TEST(PathTextures, ShowSharesOfEmission) {
