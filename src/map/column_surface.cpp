@@ -148,17 +148,14 @@ Result<std::shared_ptr<const ColumnSurface>> SurfaceCache::read(int x, int z) {
   std::shared_ptr<Entry> entry;
   {
     const std::scoped_lock lock(mutex_);
-    std::shared_ptr<Entry>& known = entries_[*square];
-    if (!known) known = std::make_shared<Entry>();
-    known->last_use = ++uses_;
-    entry = known;
-    const std::size_t held = entries_.size() * sizeof(ColumnSurface);
-    if (held > kMostBytes) {
-      std::unordered_map<std::size_t, LastUse> uses;
-      for (const auto& [number, each] : entries_) uses.emplace(number, LastUse{each->last_use});
+    KnownSquare& known = entries_[*square];
+    if (!known.entry) known.entry = std::make_shared<Entry>();
+    known.last_use = ++uses_;
+    entry = known.entry;
+    if (const std::size_t held = entries_.size() * sizeof(ColumnSurface); held > kMostBytes) {
       drop_oldest(
-          uses, held, kMostBytes / 8 * 7, [&](auto each) { return each->first != *square; },
-          [](auto) { return sizeof(ColumnSurface); }, [&](auto each) { entries_.erase(each->first); });
+          entries_, held, kMostBytes / 8 * 7, [&](auto each) { return each->first != *square; },
+          [](auto) { return sizeof(ColumnSurface); }, [&](auto each) { entries_.erase(each); });
     }
   }
   const std::scoped_lock lock(entry->mutex);

@@ -106,14 +106,14 @@ class SurfaceCache {
     std::mutex mutex;  // held while the square is read
     bool is_read = false;
     std::shared_ptr<const ColumnSurface> surface;
+  };
+  struct KnownSquare {
+    std::shared_ptr<Entry> entry;  // kept by its readers when it is dropped
     std::uint64_t last_use = 0;
   };
   struct Scratch {
     std::optional<TypeLooks> looks;
     std::optional<SurfaceBuilder> builder;
-  };
-  struct LastUse {
-    std::uint64_t last_use = 0;
   };
   [[nodiscard]] Result<std::shared_ptr<const ColumnSurface>> read_square(std::size_t square);
   [[nodiscard]] Result<std::shared_ptr<const ColumnSurface>> read_square(std::size_t number, SurfaceBuilder& builder);
@@ -123,7 +123,7 @@ class SurfaceCache {
   std::vector<Square> squares_;
   ObjectPool<Scratch> scratch_;
   mutable std::mutex mutex_;
-  std::unordered_map<std::size_t, std::shared_ptr<Entry>> entries_;
+  std::unordered_map<std::size_t, KnownSquare> entries_;
   std::map<std::size_t, std::vector<SourceSign>> signs_;
   std::map<std::string, Error> broken_;
   std::uint64_t chunks_ = 0;

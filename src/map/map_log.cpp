@@ -32,24 +32,17 @@ constexpr std::size_t kMaxRecord = std::size_t{1} << 24;
 constexpr std::uint8_t kHasFile = 1;
 constexpr std::uint8_t kIsGone = 2;
 
-template <class T>
-void add(std::vector<std::byte>& bytes, T value) {
-  bytes.resize(bytes.size() + sizeof value);
-  put_number(bytes.data() + bytes.size() - sizeof value, value, std::endian::little);
-}
-
 std::vector<std::byte> record_of(TilePlace place, const TileRecord& record, bool is_gone) {
-  std::vector<std::byte> bytes;
-  add(bytes, static_cast<std::uint32_t>(kFixedBytes + record.signs.size() + kHashBytes));
-  add(bytes, static_cast<std::int32_t>(place.z));
-  add(bytes, static_cast<std::int32_t>(place.x));
-  add(bytes, static_cast<std::int32_t>(place.y));
-  add(bytes, record.stamp);
-  add(bytes, static_cast<std::uint8_t>((record.has_file ? kHasFile : 0) | (is_gone ? kIsGone : 0)));
-  const auto signs = std::as_bytes(std::span(record.signs));
-  bytes.insert(bytes.end(), signs.begin(), signs.end());
-  add(bytes, hash_of_bytes(kHashSeed, bytes));
-  return bytes;
+  ByteWriter out;
+  out.u32(static_cast<std::uint32_t>(kFixedBytes + record.signs.size() + kHashBytes));
+  out.i32(place.z);
+  out.i32(place.x);
+  out.i32(place.y);
+  out.u64(record.stamp);
+  out.u8(static_cast<std::uint8_t>((record.has_file ? kHasFile : 0) | (is_gone ? kIsGone : 0)));
+  out.text(record.signs);
+  out.u64(hash_of_bytes(kHashSeed, out.bytes()));
+  return out.take();
 }
 
 Error cannot_write(const std::filesystem::path& path) {
@@ -58,9 +51,9 @@ Error cannot_write(const std::filesystem::path& path) {
 
 std::vector<std::byte> heading(const std::string& identity) {
   QUOIN_ASSERT(identity.find('\n') == std::string::npos, "an identity of one line");
-  const std::string text = std::string(kMagic) + identity + "\n";
-  const auto bytes = std::as_bytes(std::span(text));
-  return {bytes.begin(), bytes.end()};
+  ByteWriter out;
+  out.text(std::string(kMagic) + identity + "\n");
+  return out.take();
 }
 
 }  // namespace

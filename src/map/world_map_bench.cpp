@@ -15,13 +15,14 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <string>
 
 #include <benchmark/benchmark.h>
 #include <quoin/io/block_packs.h>
 #include <quoin/store/world_import.h>
+
+#include "bench/process_memory.h"
 
 namespace quoin {
 namespace {
@@ -60,15 +61,6 @@ std::uint64_t bytes_below(const fs::path& folder) {
   return bytes;
 }
 
-double peak_megabytes() {
-  std::ifstream in("/proc/self/status");
-  std::string line;
-  while (std::getline(in, line)) {
-    if (line.starts_with("VmHWM")) return std::strtod(line.c_str() + 6, nullptr) * 1024.0 / 1e6;
-  }
-  return 0.0;
-}
-
 std::unique_ptr<ChunkSource> opened(const fs::path& world) {
   auto source = open_map_source(world);
   auto packs = BlockPacks::open(std::vector<fs::path>{kBuiltinPack});
@@ -79,7 +71,7 @@ void draw(benchmark::State& state, const fs::path& world) {
   if (world.empty() || !fs::exists(world)) return state.SkipWithError("needs ../shared/data and python3");
   const fs::path folder = scratch() / "map";
   std::uint64_t chunks = 0;
-  std::ofstream("/proc/self/clear_refs") << 5;
+  reset_peak();
   for (auto _ : state) {
     state.PauseTiming();
     fs::remove_all(folder);
@@ -92,7 +84,7 @@ void draw(benchmark::State& state, const fs::path& world) {
   state.counters["chunks"] = benchmark::Counter(static_cast<double>(chunks), benchmark::Counter::kIsRate);
   state.counters["share"] =
       static_cast<double>(bytes_below(folder / "tiles")) / static_cast<double>(bytes_below(world));
-  state.counters["peak_mb"] = peak_megabytes();
+  state.counters["peak_mb"] = status_megabytes("VmHWM:");
 }
 
 void map_1_12(benchmark::State& state) {

@@ -253,7 +253,7 @@ class MinecraftSource final : public ChunkSource {
 
   /// Returns false if a chunk says that it belongs elsewhere. Programs that copy chunks may not care.
   static bool is_at(nbt::Value root, IVec3 place) {
-    const nbt::Value level = root["Level"] ? root["Level"] : root;
+    const nbt::Value level = chunk_content(root);
     const auto x = level["xPos"].integer();
     const auto z = level["zPos"].integer();
     return !x || !z || (*x == place.x && *z == place.z);

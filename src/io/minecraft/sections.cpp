@@ -244,7 +244,7 @@ Status SectionReader::read_section(nbt::Value section, nbt::Value level) {
 
 Status SectionReader::read(nbt::Value root, SectionOrder order, int top, FunctionRef<bool(const Section&)> take,
                            FunctionRef<void(const Error&)> broken) {
-  const nbt::Value level = root["Level"] ? root["Level"] : root;
+  const nbt::Value level = chunk_content(root);
   const nbt::Value stored = nbt::first_of(level, "sections", "Sections");
   if (!stored && level["Blocks"]) return read_mcregion(level, order, top, take);
   sections_.clear();

@@ -29,6 +29,11 @@ struct Section {
   std::vector<BiomeTints> biomes;  ///< the section's biomes, at least one
 };
 
+/// Returns the compound with a chunk's content: "Level", or since 1.18 the root itself.
+[[nodiscard]] inline nbt::Value chunk_content(nbt::Value root) {
+  return root["Level"] ? root["Level"] : root;
+}
+
 /// The order of a chunk's sections. Downwards: those that are no longer wanted are not decoded.
 enum class SectionOrder : std::uint8_t { AsStored, Downwards };
 

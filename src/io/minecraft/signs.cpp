@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/bytes/text.h"
+#include "io/minecraft/sections.h"
 
 namespace quoin::minecraft {
 
@@ -107,7 +108,7 @@ std::string text_of_line(nbt::Value line) {
 }
 
 void add_signs(nbt::Value root, std::vector<SourceSign>& signs) {
-  const nbt::Value level = root["Level"] ? root["Level"] : root;
+  const nbt::Value level = chunk_content(root);
   nbt::first_of(level, "block_entities", "TileEntities").for_each([&](nbt::Value entity) {
     const std::string_view id = entity["id"].text().value_or("");
     if (id != "Sign" && !id.ends_with(":sign") && !id.ends_with(":hanging_sign")) return;

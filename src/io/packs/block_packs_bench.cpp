@@ -32,6 +32,7 @@
 #include <benchmark/benchmark.h>
 #include <quoin/io/file.h>
 
+#include "bench/process_memory.h"
 #include "io/packs/pack_files.h"
 #include "io/packs/packs_for_tests.h"
 
@@ -42,21 +43,6 @@ void require(bool holds, const char* text) {
   if (holds) return;
   std::fprintf(stderr, "packs benchmark: %s\n", text);
   std::exit(1);
-}
-
-// Returns a figure of /proc/self/status in MB; 0 if the system has none.
-double status_megabytes(std::string_view name) {
-  std::ifstream in("/proc/self/status");
-  std::string line;
-  while (std::getline(in, line)) {
-    if (line.starts_with(name)) return std::strtod(line.c_str() + name.size() + 1, nullptr) * 1024.0 / 1e6;
-  }
-  return 0.0;
-}
-
-// Lets VmHWM start again from the present memory.
-void reset_peak() {
-  std::ofstream("/proc/self/clear_refs") << 5;
 }
 
 // A file that is generated once and removed at the end.
